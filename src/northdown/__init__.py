@@ -1,0 +1,3 @@
+"""northdown: attitude and heading from inertial and magnetic sensors."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,281 @@
+"""The one loop that serves every filter: over a whole recording, over a part of it, or for one live sample.
+
+A filter is a function ``step(p, s, dt, gyr, acc, mag) -> s`` on tuples: parameters p, state s whose first four
+entries are the attitude quaternion (body to NED), time since the last sample, and the three sensor vectors.
+NaN in acc or mag means that there is no sample. :class:`Kernel` compiles the loop around it.
+
+What all filters share is done here, once: the start from the first usable accelerometer and magnetometer
+samples, holding the last rate through short gaps of the gyroscope, and turning the result to the frame asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from numba.np.unsafe.ndarray import to_fixed_tuple as _to_fixed_tuple
+
+from northdown.kernels.jit import compiled, inline
+from northdown.kernels.quaternion import dot, down_b, multiply
+from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
+
+# The runner's own entries at the head of the state array.
+PENDING: Final = 0  # bits TILT_UNKNOWN, HEADING_UNKNOWN still to be found from the sensors
+HELD: Final = 1  # last rate of the gyroscope, three entries
+GAP: Final = 4  # time (s) since the last gyroscope sample
+LAST: Final = 5  # time (s) of the last sample; NaN before the first
+MAX_GAP: Final = 6  # longest time (s) for which a rate is held
+N_RUNNER: Final = 7
+
+# Bits of the flags written for every sample; `northdown.orientation.Flag` gives them their public names.
+TILT_UNKNOWN: Final = 1
+HEADING_UNKNOWN: Final = 2
+GYRO_HELD: Final = 4
+LONG_STEP: Final = 8
+
+# Return codes; a run returns the number of samples done and one of these.
+OK: Final = 0
+TIME_BACKWARDS: Final = 1
+GYRO_GAP: Final = 2
+NOT_FINITE: Final = 3
+
+_NAN: Final = math.nan
+
+# numba turns it into the tuple of an array's first entries; for the type checker it is anything.
+to_fixed_tuple: Any = _to_fixed_tuple
+
+Array = npt.NDArray[np.float64]
+Step = Callable[..., tuple[float, ...]]
+
+
+@inline
+def replace_attitude(p: tuple[float, ...], s: Any, q: Any) -> Any:
+    """Put the attitude found at the start into the state (the default of `Kernel.aligned`)."""
+    return q + s[4:]
+
+
+@inline
+def same_state(p: tuple[float, ...], s: Any) -> Any:
+    """What is recorded of the state: all of it (the default of `Kernel.output`)."""
+    return s
+
+
+@inline
+def start_tilt(q: Any, acc: Any) -> Any:
+    """Level the attitude q by one accelerometer sample.
+
+    From more than 90 degrees away the body is first turned over about its own x axis, so that the result does
+    not hang on noise where the shortest arc has no definite axis, and the x axis keeps its heading.
+    """
+    if dot(down_b(q), acc) > 0.0:
+        q = multiply(q, (0.0, 1.0, 0.0, 0.0))
+    return multiply(tilt_correction(q, acc), q)
+
+
+def _make_tick(step: Step, aligned: Callable[..., Any]) -> Callable[..., Any]:
+    """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
+
+    @inline
+    def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
+        pending, hx, hy, hz, gap, max_gap = r
+        flags = 0
+        code = OK
+        if gyr[0] == gyr[0] and gyr[1] == gyr[1] and gyr[2] == gyr[2]:
+            gap = 0.0
+            if dt > max_gap:
+                flags = LONG_STEP
+        else:
+            gap += dt
+            flags = GYRO_HELD
+            gyr = (hx, hy, hz)
+            if gap > max_gap:
+                code = GYRO_GAP
+        if pending == 0.0:
+            s = step(p, s, dt, gyr, acc, mag)
+        else:
+            nothing = (_NAN, _NAN, _NAN)
+            tilt_pending = pending != float(HEADING_UNKNOWN)
+            tilt_now = tilt_pending and dot(acc, acc) > 0.0
+            s = step(p, s, dt, gyr, nothing if tilt_pending else acc, nothing)
+            q = (s[0], s[1], s[2], s[3])
+            if tilt_now:
+                q = start_tilt(q, acc)
+                pending -= float(TILT_UNKNOWN)
+            heading_now = (
+                pending == float(HEADING_UNKNOWN) and (tilt_now or not tilt_pending) and has_heading(down_b(q), mag)
+            )
+            if heading_now:
+                q = turn_about_down(heading_error(q, mag), q)
+                pending -= float(HEADING_UNKNOWN)
+            if tilt_now or heading_now:
+                s = aligned(p, s, q)
+            flags |= int(pending)
+        return code, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
+
+    return tick
+
+
+def _make_run(kernel: Kernel) -> Callable[..., Any]:
+    tick = _make_tick(kernel.step, kernel.aligned)
+    output = kernel.output
+    n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+
+    def run(
+        params: Array,
+        state: Array,
+        turn: Array,
+        time: Array,
+        gyr: Array,
+        acc: Array,
+        mag: Array,
+        out: Array,
+        flags: npt.NDArray[np.uint8],
+    ) -> tuple[int, int]:
+        p = to_fixed_tuple(params, n_params)
+        s = to_fixed_tuple(state[N_RUNNER:], n_state)
+        r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
+        last = state[LAST]
+        f = (turn[0], turn[1], turn[2], turn[3])
+        is_turned = f[0] != 1.0
+        code = OK
+        done = len(time)
+        for i in range(len(time)):
+            dt = time[i] - last if last == last else 0.0
+            if dt < 0.0:
+                code = TIME_BACKWARDS
+                done = i
+                break
+            code, flag, s, r = tick(
+                p,
+                s,
+                r,
+                dt,
+                (gyr[i, 0], gyr[i, 1], gyr[i, 2]),
+                (acc[i, 0], acc[i, 1], acc[i, 2]),
+                (mag[i, 0], mag[i, 1], mag[i, 2]),
+            )
+            last = time[i]
+            if flag != 0:
+                flags[i] = flag
+                if code != OK:
+                    done = i
+                    break
+            o = output(p, s)
+            if is_turned:
+                q = multiply(f, (o[0], o[1], o[2], o[3]))
+                out[i, 0] = q[0]
+                out[i, 1] = q[1]
+                out[i, 2] = q[2]
+                out[i, 3] = q[3]
+            else:
+                for j in range(4):
+                    out[i, j] = o[j]
+            for j in range(4, n_out):
+                out[i, j] = o[j]
+        if code == OK and len(time) > 0 and s[0] != s[0]:
+            code = NOT_FINITE
+            for i in range(len(time)):
+                if out[i, 0] != out[i, 0]:
+                    done = i
+                    break
+        for j in range(n_state):
+            state[N_RUNNER + j] = s[j]
+        for j in range(5):
+            state[j] = r[j]
+        state[LAST] = last
+        return code, done
+
+    return run
+
+
+def _make_update(kernel: Kernel) -> Callable[..., Any]:
+    tick = _make_tick(kernel.step, kernel.aligned)
+    output = kernel.output
+    n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+
+    def update(
+        params: Array, state: Array, turn: Array, time: float, gyr: Array, acc: Array, mag: Array, out: Array
+    ) -> Any:
+        if gyr.size != 3 or acc.size != 3 or mag.size != 3:
+            return -1
+        last = state[LAST]
+        dt = time - last if last == last else 0.0
+        if not dt >= 0.0:
+            return -1 - TIME_BACKWARDS
+        p = to_fixed_tuple(params, n_params)
+        s = to_fixed_tuple(state[N_RUNNER:], n_state)
+        r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
+        code, flag, s, r = tick(
+            p, s, r, dt, (gyr[0], gyr[1], gyr[2]), (acc[0], acc[1], acc[2]), (mag[0], mag[1], mag[2])
+        )
+        if code != OK:
+            return -1 - code
+        o = output(p, s)
+        q = (o[0], o[1], o[2], o[3])
+        if q[0] - q[0] != 0.0:
+            return -1 - NOT_FINITE
+        if turn[0] != 1.0:
+            q = multiply((turn[0], turn[1], turn[2], turn[3]), q)
+        for j in range(4):
+            out[j] = q[j]
+        for j in range(4, n_out):
+            out[j] = o[j]
+        for j in range(n_state):
+            state[N_RUNNER + j] = s[j]
+        for j in range(5):
+            state[j] = r[j]
+        state[LAST] = time
+        return int(flag)
+
+    return update
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A filter's step together with the compiled loops around it.
+
+    Parameters
+    ----------
+    name : str
+        Unique name, used for the compilation cache.
+    step : inlined function
+        ``step(p, s, dt, gyr, acc, mag) -> s`` as described in the module's docstring.
+    n_params, n_state : int
+        Lengths of the tuples p and s.
+    n_out : int
+        How many entries of what `output` returns are recorded for every sample; the first four are the attitude.
+    output : inlined function
+        ``output(p, s) -> tuple``, what is recorded.
+    aligned : inlined function
+        ``aligned(p, s, q) -> s``, the state after its attitude has been set from the sensors.
+
+    Notes
+    -----
+    ``run(params, state, turn, time, gyr, acc, mag, out, flags)`` works through arrays and returns a code and the
+    number of samples done. ``update(params, state, turn, time, gyr, acc, mag, out)`` takes one sample, returns its
+    flags or −1 − code, and on failure leaves the state as it was. `turn` is the quaternion from NED to
+    the frame of the result.
+    """
+
+    name: str
+    step: Step
+    n_params: int
+    n_state: int
+    n_out: int
+    output: Callable[..., Any] = same_state
+    aligned: Callable[..., Any] = replace_attitude
+
+    @cached_property
+    def run(self) -> Callable[..., tuple[int, int]]:
+        """The compiled loop over arrays."""
+        return compiled(_make_run(self), f"{self.name}-run")
+
+    @cached_property
+    def update(self) -> Callable[..., int]:
+        """The compiled work for one live sample."""
+        return compiled(_make_update(self), f"{self.name}-update")

@@ -1,0 +1,262 @@
+"""`Orientation`: attitude over time with its frame, uncertainty, gyroscope bias and flags."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from northdown._validation import (
+    FloatArray,
+    as_float_array,
+    check_increasing,
+    check_no_infinity,
+    check_time,
+    check_vectors,
+)
+from northdown.errors import InputError, expected
+from northdown.frames import EULER_COLUMNS, Frame, as_euler, check_frame, rotation_between
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from scipy.spatial.transform import Rotation
+
+
+class Flag(enum.IntFlag):
+    """What is to be known of a sample of an `Orientation`; combine with ``&``."""
+
+    TILT_UNKNOWN = 1
+    """No accelerometer sample has been seen yet: the attitude is arbitrary."""
+    HEADING_UNKNOWN = 2
+    """No usable magnetometer sample has been seen yet: heading is relative to the start."""
+    GYRO_HELD = 4
+    """The gyroscope had no sample; its last one was used."""
+    LONG_STEP = 8
+    """More time than the maximum gap has passed since the last sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Orientation of a body over time.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Time in seconds, not decreasing.
+    quat : (N, 4) array
+        Unit quaternions (w, x, y, z), Hamilton, from body to `frame`. Normalised here; a norm off by more than
+        1 % is an error.
+    frame : {"NED", "ENU", "NWU"}
+        Navigation frame.
+    covariance : (N, 3, 3) array, optional
+        Covariance in rad² of the small rotation vector δ, in axes of `frame`, with
+        true rotation = exp(δ) · estimate. None where the method has none.
+    gyr_bias : (N, 3) array, optional
+        Estimated gyroscope bias, rad/s, in body axes.
+    flags : (N,) array of int, optional
+        Bits of `Flag`; zero when not given.
+    name : str
+        Where it comes from: the estimator's or the recording's name.
+    """
+
+    time: FloatArray
+    quat: FloatArray
+    frame: Frame = "NED"
+    covariance: FloatArray | None = None
+    gyr_bias: FloatArray | None = None
+    flags: npt.NDArray[np.integer[Any]] = field(default=None)  # type: ignore[arg-type]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        set_field(self, "time", check_time(self.time))
+        set_field(self, "frame", check_frame(self.frame))
+        check_increasing(self.time)
+        n = len(self.time)
+        set_field(self, "quat", _check_quat(self.quat, n))
+        if self.covariance is not None:
+            cov = as_float_array("covariance", self.covariance)
+            if cov.shape != (n, 3, 3):
+                raise InputError(expected(f"covariance of shape ({n}, 3, 3)", f"shape {cov.shape}"))
+            check_no_infinity("covariance", cov.reshape(n, 9))
+            set_field(self, "covariance", cov)
+        if self.gyr_bias is not None:
+            set_field(self, "gyr_bias", check_vectors("gyr_bias", self.gyr_bias, n))
+        flags = np.zeros(n, np.uint8) if self.flags is None else np.asarray(self.flags)
+        if flags.shape != (n,) or flags.dtype.kind not in "iub":
+            raise InputError(expected(f"flags of shape ({n},) of integers", f"shape {flags.shape}, {flags.dtype}"))
+        set_field(self, "flags", flags.astype(np.uint8))
+
+    @classmethod
+    def _trusted(cls, **values: Any) -> Orientation:
+        """Build from arrays that northdown itself has just computed, without checking them again."""
+        self = object.__new__(cls)
+        self.__dict__.update({"covariance": None, "gyr_bias": None, "name": ""} | values)
+        return self
+
+    @classmethod
+    def from_rotation(cls, time: npt.ArrayLike, rotation: Rotation, frame: str = "NED", **other: Any) -> Orientation:
+        """Orientation from a SciPy `Rotation` (body → frame) of length N."""
+        quat = np.roll(np.atleast_2d(rotation.as_quat()), 1, axis=-1)
+        return cls(check_time(time), quat, check_frame(frame), **other)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "no samples"
+        extras = [n for n in ("covariance", "gyr_bias") if getattr(self, n) is not None]
+        return f"<Orientation {self.name or 'unnamed'}: {len(self)} samples, {span}, body → {self.frame}" + (
+            f", with {' and '.join(extras)}>" if extras else ">"
+        )
+
+    def __getitem__(self, index: slice | npt.NDArray[Any]) -> Orientation:
+        """Part of the orientation, by slice, mask or increasing indices."""
+        if not isinstance(index, (slice, np.ndarray)):
+            raise InputError(expected("a slice, a mask or an array of indices", repr(index)))
+        pick: dict[str, Any] = {k: v[index] for k, v in self._arrays()}
+        return replace(self, **pick)
+
+    def _arrays(self) -> Iterator[tuple[str, Any]]:
+        for key in ("time", "quat", "covariance", "gyr_bias", "flags"):
+            value = getattr(self, key)
+            if value is not None:
+                yield key, value
+
+    @cached_property
+    def rotation(self) -> Rotation:
+        """SciPy `Rotation` of length N, body → `frame`."""
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(np.roll(self.quat, -1, axis=-1))
+
+    def has(self, flag: Flag) -> npt.NDArray[np.bool_]:
+        """Samples, (N,) booleans, at which any of the bits of `flag` is set."""
+        found: npt.NDArray[np.bool_] = (self.flags & int(flag)) != 0
+        return found
+
+    def to_frame(self, frame: str) -> Orientation:
+        """The same orientation expressed in another navigation frame."""
+        target = check_frame(frame)
+        if target == self.frame:
+            return self
+        turn = rotation_between(self.frame, target)
+        mat = turn.as_matrix()
+        cov = None if self.covariance is None else mat @ self.covariance @ mat.T
+        quat = np.roll((turn * self.rotation).as_quat(), 1, axis=-1) if len(self) else self.quat
+        return replace(self, quat=quat, frame=target, covariance=cov)
+
+    def turned(self, left: Rotation | None = None, right: Rotation | None = None) -> Orientation:
+        """Left · rotation · right: constant rotations of the navigation frame and of the body frame.
+
+        Parameters
+        ----------
+        left : Rotation, optional
+            Turns the navigation frame; the covariance turns with it.
+        right : Rotation, optional
+            Turns the body frame, as when the sensor is remounted; the gyroscope bias turns with it.
+        """
+        result = self.rotation
+        cov, bias = self.covariance, self.gyr_bias
+        if left is not None:
+            result = left * result
+            mat = left.as_matrix()
+            cov = None if cov is None else mat @ cov @ mat.T
+        if right is not None:
+            result = result * right
+            bias = None if bias is None else right.inv().apply(bias)
+        return replace(self, quat=np.roll(result.as_quat(), 1, axis=-1), covariance=cov, gyr_bias=bias)
+
+    def as_euler(self, convention: str = "zyx", *, degrees: bool = False) -> FloatArray:
+        """Euler angles, (N, 3), in rad unless `degrees`.
+
+        Parameters
+        ----------
+        convention : {"zyx", "rfu"}
+            ``"zyx"`` (roll, pitch, yaw) of body → this orientation's own frame: the aerospace angles when the frame
+            is NED and the body forward-right-down. ``"rfu"`` (pitch, roll, heading) for a body with axes
+            right-forward-up; heading clockwise from north, whatever the frame.
+        degrees : bool
+            Give degrees.
+        """
+        rotation = self.to_frame("ENU").rotation if convention == "rfu" else self.rotation
+        angles = as_euler(rotation, convention)
+        return np.rad2deg(angles) if degrees else angles
+
+    def at(self, time: npt.ArrayLike) -> Orientation:
+        """Orientation at other times within the span, by spherical linear interpolation.
+
+        Covariance and bias are interpolated linearly; flags of both neighbours are combined.
+
+        Raises
+        ------
+        InputError
+            When a time lies outside the span, or there is nothing to interpolate.
+        """
+        from scipy.spatial.transform import Rotation
+
+        t = check_time(np.atleast_1d(as_float_array("time", time)))
+        check_increasing(t)
+        if not len(self) or (len(t) and (t[0] < self.time[0] or t[-1] > self.time[-1])):
+            span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "no samples"
+            got = f"{t[0]:g} to {t[-1]:g} s" if len(t) else "no times"
+            raise InputError(expected(f"times within the orientation's span ({span})", got, do="cut the times first"))
+        right = np.clip(np.searchsorted(self.time, t, side="left"), 1 if len(self) > 1 else 0, len(self) - 1)
+        left = np.maximum(right - 1, 0)
+        step = self.time[right] - self.time[left]
+        u = np.divide(t - self.time[left], step, out=np.ones_like(t), where=step > 0.0)
+        first = self.rotation[left]
+        turn = (first.inv() * self.rotation[right]).as_rotvec() * u[:, None]
+        quat = np.roll((first * Rotation.from_rotvec(turn)).as_quat(), 1, axis=-1)
+
+        def blend(x: FloatArray | None) -> FloatArray | None:
+            if x is None:
+                return None
+            k = u.reshape(-1, *[1] * (x.ndim - 1))
+            return x[left] * (1.0 - k) + x[right] * k
+
+        flags = self.flags[left] * (u < 1.0) | self.flags[right] * (u > 0.0)
+        return replace(
+            self,
+            time=t,
+            quat=quat,
+            covariance=blend(self.covariance),
+            gyr_bias=blend(self.gyr_bias),
+            flags=flags,
+        )
+
+    def to_pandas(self, convention: str = "zyx") -> pd.DataFrame:
+        """Table with one row per sample: quaternion, Euler angles (rad), sigmas (rad), bias (rad/s), flags."""
+        import pandas as pd
+
+        columns: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        columns |= {f"q{c}": self.quat[:, i] for i, c in enumerate("wxyz")}
+        angles = self.as_euler(convention)
+        columns |= {name: angles[:, i] for i, name in enumerate(EULER_COLUMNS[convention])}
+        if self.covariance is not None:
+            for i, j in zip(*np.triu_indices(3), strict=True):
+                columns[f"cov_{'xyz'[i]}{'xyz'[j]}"] = self.covariance[:, i, j]
+        if self.gyr_bias is not None:
+            columns |= {f"gyr_bias_{c}": self.gyr_bias[:, i] for i, c in enumerate("xyz")}
+        columns["flags"] = self.flags
+        table = pd.DataFrame(columns)
+        table.attrs = {"frame": self.frame, "name": self.name}
+        return table
+
+
+def _check_quat(value: Any, n: int) -> FloatArray:
+    quat = as_float_array("quat", value)
+    if quat.shape != (n, 4):
+        raise InputError(expected(f"quat of shape ({n}, 4), order w, x, y, z", f"shape {quat.shape}"))
+    norm = np.sqrt((quat * quat).sum(axis=1))
+    bad = ~(np.abs(norm - 1.0) < 0.01)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(expected("unit quaternions", f"norm {norm[row]:g}", at=row, do="leave out missing samples"))
+    unit: FloatArray = quat / norm[:, None]
+    return unit

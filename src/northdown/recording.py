@@ -1,0 +1,218 @@
+"""`Recording`: what the sensors said, when, and what is known to be true."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from northdown._validation import (
+    BoolArray,
+    FloatArray,
+    check_choice,
+    check_mask,
+    check_number,
+    check_time,
+    check_vectors,
+)
+from northdown.checks import Findings, check_recording
+from northdown.errors import InputError, expected
+from northdown.frames import Frame, check_frame, mounting_matrix
+from northdown.orientation import Orientation
+
+SENSORS = ("gyr", "acc", "mag")
+
+ReferenceOffset = Literal["none", "heading", "rotations"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Recording of a gyroscope, an accelerometer and a magnetometer on one body.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Time in seconds.
+    gyr : (N, 3) array, optional
+        Angular rate in body axes, rad/s. A sample stands for the time since the sample before it.
+    acc : (N, 3) array, optional
+        Specific force in body axes, m/s²: +9.81 on the axis that points up at rest.
+    mag : (N, 3) array, optional
+        Magnetic field in body axes, µT unless `mag_unit` says otherwise. A row with NaN in `acc` or `mag` means that
+        there was no sample at that time.
+    reference : Orientation, optional
+        What is known of the true orientation; may have times of its own.
+    movement : (N,) array of bool, optional
+        Samples over which errors are to be counted.
+    frame : {"NED", "ENU", "NWU"}
+        Navigation frame in which results are wanted, and in which `reference` is.
+    name : str
+        For tables and figures.
+    mag_unit : {"uT", "arbitrary"}
+        ``"arbitrary"`` when the field's size has no known unit; its direction is all that estimators need.
+    reference_offset : {"none", "heading", "rotations"}
+        How the reference's axes differ from the sensor's by constant rotations: not at all, in heading only, or
+        both the navigation and the body frame (to be found by alignment).
+
+    Raises
+    ------
+    InputError
+        On wrong shapes, infinite values, or when there is no sensor at all.
+    """
+
+    time: FloatArray
+    gyr: FloatArray | None = None
+    acc: FloatArray | None = None
+    mag: FloatArray | None = None
+    reference: Orientation | None = None
+    movement: BoolArray | None = None
+    frame: Frame = "NED"
+    name: str = ""
+    mag_unit: Literal["uT", "arbitrary"] = "uT"
+    reference_offset: ReferenceOffset = "none"
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        set_field(self, "time", check_time(self.time))
+        set_field(self, "frame", check_frame(self.frame))
+        check_choice("mag_unit", self.mag_unit, ("uT", "arbitrary"))
+        check_choice("reference_offset", self.reference_offset, ("none", "heading", "rotations"))
+        n = len(self.time)
+        for sensor in SENSORS:
+            value = getattr(self, sensor)
+            if value is not None:
+                set_field(self, sensor, check_vectors(sensor, value, n))
+        if self.gyr is None and self.acc is None and self.mag is None:
+            raise InputError(expected("at least one of gyr, acc and mag", "none"))
+        if self.movement is not None:
+            set_field(self, "movement", check_mask("movement", self.movement, n))
+        if self.reference is not None and not isinstance(self.reference, Orientation):
+            raise InputError(expected("reference as an Orientation", type(self.reference).__name__))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        span = f"{self.time[-1] - self.time[0]:.1f} s at {self.rate:.1f} Hz" if len(self) > 1 else "no duration"
+        sensors = "+".join(s for s in SENSORS if getattr(self, s) is not None)
+        tail = ", with reference" if self.reference is not None else ""
+        return f"<Recording {self.name or 'unnamed'}: {len(self)} samples, {span}, {sensors}, {self.frame}{tail}>"
+
+    @property
+    def rate(self) -> float:
+        """Median sampling rate, Hz; NaN with fewer than two samples."""
+        if len(self) < 2:
+            return float("nan")
+        step = float(np.median(np.diff(self.time)))
+        return 1.0 / step if step > 0.0 else float("nan")
+
+    @property
+    def duration(self) -> float:
+        """Time from first to last sample, s."""
+        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
+
+    def check(self) -> Findings:
+        """Look for what commonly goes wrong in recordings: findings in words, worst first.
+
+        Returns
+        -------
+        Findings
+            True rate and jitter, gaps, duplicates, time that runs backwards, saturated and stuck samples,
+            implausible magnitudes with the unit they suggest, a resting accelerometer that contradicts the
+            declared frame, and a magnetic norm that varies. ``print`` it.
+        """
+        return check_recording(self.time, self.gyr, self.acc, self.mag, frame=self.frame, mag_unit=self.mag_unit)
+
+    def _select(self, index: Any) -> Recording:
+        picked: dict[str, Any] = {
+            k: None if getattr(self, k) is None else getattr(self, k)[index] for k in (*SENSORS, "movement")
+        }
+        return replace(self, time=self.time[index], **picked)
+
+    def __getitem__(self, index: slice | npt.NDArray[Any]) -> Recording:
+        """Samples by slice, mask or indices; the reference is kept whole, as it has its own times."""
+        if not isinstance(index, (slice, np.ndarray)):
+            raise InputError(expected("a slice, a mask or an array of indices", repr(index)))
+        return self._select(index)
+
+    def between(self, start: float, stop: float) -> Recording:
+        """Samples with start ≤ time < stop (s)."""
+        return self._select((self.time >= start) & (self.time < stop))
+
+    def sort(self) -> Recording:
+        """The same samples in order of time; samples of equal time keep their order."""
+        return self._select(np.argsort(self.time, kind="stable"))
+
+    def remap(self, mounting: str) -> Recording:
+        """Rename the sensor's axes, as when it is mounted otherwise.
+
+        Parameters
+        ----------
+        mounting : str
+            Three signed axes: ``"y,-x,z"`` makes the new x the old y, the new y the old −x. The reference's body
+            axes are changed likewise.
+        """
+        return self.rotate_body(mounting_matrix(mounting))
+
+    def rotate_body(self, mat: npt.ArrayLike) -> Recording:
+        """Express all vectors in other body axes, v' = mat v, with a rotation matrix (3, 3)."""
+        from scipy.spatial.transform import Rotation
+
+        m = np.asarray(mat, dtype=np.float64)
+        if m.shape != (3, 3) or not np.allclose(m @ m.T, np.eye(3), atol=1e-9) or np.linalg.det(m) < 0.0:
+            raise InputError(expected("a rotation matrix of shape (3, 3)", f"shape {m.shape}, not a rotation"))
+        turned: dict[str, Any] = {s: None if getattr(self, s) is None else getattr(self, s) @ m.T for s in SENSORS}
+        reference = self.reference
+        if reference is not None and self.reference_offset != "rotations":
+            reference = reference.turned(right=Rotation.from_matrix(m).inv())
+        return replace(self, reference=reference, **turned)
+
+    def resample(self, rate: float) -> Recording:
+        """Resample to a constant rate (Hz).
+
+        The gyroscope's angle, not its value, is interpolated, so that no rotation is lost; the others are
+        interpolated linearly between their own samples, and stay missing across their gaps longer than two of the new
+        periods or two of their own. No anti-aliasing filter is applied.
+
+        Raises
+        ------
+        InputError
+            With fewer than two samples, time that does not increase, or missing gyroscope samples.
+        """
+        rate = check_number("rate", rate, above=0.0, unit="Hz")
+        dt = np.diff(self.time)
+        if len(self) < 2 or (dt <= 0.0).any():
+            bad = int(np.argmax(dt <= 0.0)) + 1 if len(self) > 1 else 0
+            raise InputError(expected("two samples or more, of increasing time", "other", at=bad, do="sort it first"))
+        n = int(np.floor(self.duration * rate * (1.0 + 1e-12))) + 1
+        t = self.time[0] + np.arange(n) / rate
+        fields: dict[str, Any] = {}
+        if self.gyr is not None:
+            missing = np.isnan(self.gyr).any(axis=1)
+            if missing.any():
+                raise InputError(expected("a gyroscope without missing samples", "NaN", at=int(np.argmax(missing))))
+            angle = np.vstack([np.zeros(3), np.cumsum(self.gyr[1:] * dt[:, None], axis=0)])
+            new = np.column_stack([np.interp(t, self.time, angle[:, i]) for i in range(3)])
+            fields["gyr"] = np.vstack([self.gyr[:1], np.diff(new, axis=0) * rate])
+        for sensor in ("acc", "mag"):
+            value = getattr(self, sensor)
+            fields[sensor] = None if value is None else _interpolate(t, self.time, value, 1.0 / rate)
+        movement = None if self.movement is None else np.interp(t, self.time, self.movement.astype(float)) > 0.5
+        return replace(self, time=t, movement=movement, **fields)
+
+
+def _interpolate(t: FloatArray, time: FloatArray, value: FloatArray, period: float) -> FloatArray:
+    """Linear interpolation between the samples that are there; NaN across long gaps."""
+    there = ~np.isnan(value).any(axis=1)
+    result = np.full((len(t), 3), np.nan)
+    if there.sum() < 2:
+        return result
+    known = time[there]
+    for i in range(3):
+        result[:, i] = np.interp(t, known, value[there, i], left=np.nan, right=np.nan)
+    right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
+    gap = known[right] - known[right - 1]
+    result[gap > 2.0 * max(period, float(np.median(np.diff(known)))) * (1.0 + 1e-9)] = np.nan
+    return result
