@@ -52,11 +52,11 @@ def check_vectors(name: str, value: Any, length: int | None = None) -> FloatArra
     return array
 
 
-def check_no_infinity(name: str, array: FloatArray) -> None:
-    """Raise when an array holds an infinite value."""
+def check_no_infinity(name: str, array: FloatArray, *, at: int | None = None) -> None:
+    """Raise when an array holds an infinite value; the first row is named unless `at` is given."""
     infinite = np.isinf(array)
     if infinite.any():
-        row = int(np.argwhere(infinite)[0][0])
+        row = int(np.argwhere(infinite)[0][0]) if at is None else at
         raise InputError(
             expected(f"finite numbers in {name}", "infinity", at=row, do="use NaN where there is no sample")
         )

@@ -6,6 +6,7 @@ function(s), and a frozen dataclass of parameters derived from :class:`Estimator
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import importlib
 import math
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from northdown._validation import FloatArray, as_float_array, check_choice, check_number
+from northdown._validation import FloatArray, as_float_array, check_choice, check_no_infinity, check_number
 from northdown.errors import InputError, expected
 from northdown.frames import Frame, check_frame, quat_from_ned
 from northdown.kernels.runner import (
@@ -28,7 +29,6 @@ from northdown.kernels.runner import (
     LAST,
     MAX_GAP,
     N_RUNNER,
-    NOT_FINITE,
     PENDING,
     TILT_UNKNOWN,
     TIME_BACKWARDS,
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 _NO_SAMPLE: FloatArray = np.full(3, np.nan)
-_NO_SAMPLE.setflags(write=False)
 
 
 def parameter(
@@ -58,7 +57,7 @@ def parameter(
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Estimator:
+class Estimator(abc.ABC):
     """Base of all estimators: parameters are checked here, and `run` and `stream` are the same for all."""
 
     name: ClassVar[str]
@@ -85,12 +84,12 @@ class Estimator:
                 number = check_number(f.name, value, **f.metadata)
                 object.__setattr__(self, f.name, number)
 
-    def _parameters(self) -> Sequence[float]:
-        """The kernel's parameter tuple, in its order."""
-        raise NotImplementedError
+    @abc.abstractmethod
+    def _parameters(self, frame: Frame) -> Sequence[float]:
+        """The kernel's parameter tuple, in its order, for a result in `frame`."""
 
-    def _initial_state(self) -> Sequence[float]:
-        """The kernel's state after the quaternion, at the start."""
+    def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
+        """The kernel's state after the quaternion, for the attitude `quat` (body → NED) at the start."""
         return (0.0,) * (self.kernel.n_state - 4)
 
     def run(
@@ -173,7 +172,7 @@ class Stream:
         self.frame: Frame = check_frame(frame)
         self.flags = 0
         kernel = estimator.kernel
-        self._params = np.array(estimator._parameters(), dtype=np.float64)
+        self._params = np.array(estimator._parameters(self.frame), dtype=np.float64)
         self._turn = quat_from_ned(self.frame)
         self._period = math.nan if rate is None else 1.0 / check_number("rate", rate, above=0.0, unit="Hz")
         self._count = 0
@@ -182,9 +181,10 @@ class Stream:
         state = np.zeros(N_RUNNER + kernel.n_state)
         state[PENDING] = pending
         state[LAST] = math.nan
-        state[MAX_GAP] = check_number("max_gap", max_gap, low=0.0, unit="s")
+        max_gap = check_number("max_gap", max_gap, low=0.0, unit="s")
+        state[MAX_GAP] = max_gap if "gyr" in estimator.uses else math.inf
         state[N_RUNNER : N_RUNNER + 4] = start
-        state[N_RUNNER + 4 :] = estimator._initial_state()
+        state[N_RUNNER + 4 :] = estimator._initial_state(start, self.frame)
         self._state = state
         self._out = np.empty(kernel.n_out)
         self._row = self._out[:4]
@@ -231,9 +231,12 @@ class Stream:
         try:
             code = self._update(self._params, self._state, self._turn, time, gyr, acc, mag, self._out)
         except TypeError:
-            return self.update(_vector("gyr", gyr), _vector("acc", acc), _vector("mag", mag), time)
+            gyr, acc, mag = _vector("gyr", gyr), _vector("acc", acc), _vector("mag", mag)
+            code = self._update(self._params, self._state, self._turn, float(time), gyr, acc, mag, self._out)
         if code < 0:
-            self._raise(-1 - code, time)
+            for name, value in (("gyr", gyr), ("acc", acc), ("mag", mag)):
+                check_no_infinity(name, _vector(name, value), at=self._count)
+            self._raise(-1 - code, time, self._count)
         self.flags = code
         self._time = time
         self._count += 1
@@ -275,10 +278,7 @@ class Stream:
             **{key: out[:, where] for key, where in estimator.outputs.items()},
         )
 
-    def _raise(self, code: int, time: float, index: int | None = None) -> typing.NoReturn:
-        at = self._count if index is None else index
-        if code < 0 or code > NOT_FINITE:
-            raise InputError(expected("gyr, acc and mag of shape (3,)", "other shapes", at=at))
+    def _raise(self, code: int, time: float, at: int) -> typing.NoReturn:
         if code == TIME_BACKWARDS:
             raise InputError(
                 expected(

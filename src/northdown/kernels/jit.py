@@ -55,10 +55,11 @@ class _KernelCache(FunctionCache):
         return (sig, codegen.magic_tuple())
 
 
-def compiled(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Compile a function on its first call and keep the machine code on disk under `name`.
+def compiled(function: Callable[..., Any], name: str, signature: str) -> Callable[..., Any]:
+    """Compile a function for one signature and keep the machine code on disk under `name`.
 
-    Where numba finds no writable folder for its cache, the function is compiled anew in each process.
+    Arguments of other types raise TypeError instead of being compiled for. Where numba finds no writable folder
+    for its cache, the function is compiled anew in each process.
     """
     dispatcher = numba.njit(**_FLAGS)(function)
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -67,4 +68,6 @@ def compiled(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         dispatcher._cache = _KernelCache(function, name)
     except (RuntimeError, OSError, AttributeError) as problem:
         warnings.warn(f"compiled kernels are not kept between runs: {problem}", RuntimeWarning, stacklevel=2)
+    dispatcher.compile(signature)
+    dispatcher.disable_compile()
     return dispatcher  # type: ignore[no-any-return]

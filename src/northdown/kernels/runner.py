@@ -43,6 +43,7 @@ OK: Final = 0
 TIME_BACKWARDS: Final = 1
 GYRO_GAP: Final = 2
 NOT_FINITE: Final = 3
+WRONG_SHAPE: Final = 4
 
 _NAN: Final = math.nan
 
@@ -77,8 +78,9 @@ def start_tilt(q: Any, acc: Any) -> Any:
     return multiply(tilt_correction(q, acc), q)
 
 
-def _make_tick(step: Step, aligned: Callable[..., Any]) -> Callable[..., Any]:
+def _make_tick(kernel: Kernel) -> Callable[..., Any]:
     """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
+    step, aligned, memoryless = kernel.step, kernel.aligned, kernel.memoryless
 
     @inline
     def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
@@ -114,6 +116,8 @@ def _make_tick(step: Step, aligned: Callable[..., Any]) -> Callable[..., Any]:
                 pending -= float(HEADING_UNKNOWN)
             if tilt_now or heading_now:
                 s = aligned(p, s, q)
+                if memoryless:
+                    s = step(p, s, 0.0, gyr, acc, mag)
             flags |= int(pending)
         return code, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
 
@@ -121,7 +125,7 @@ def _make_tick(step: Step, aligned: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _make_run(kernel: Kernel) -> Callable[..., Any]:
-    tick = _make_tick(kernel.step, kernel.aligned)
+    tick = _make_tick(kernel)
     output = kernel.output
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
 
@@ -194,7 +198,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
 
 
 def _make_update(kernel: Kernel) -> Callable[..., Any]:
-    tick = _make_tick(kernel.step, kernel.aligned)
+    tick = _make_tick(kernel)
     output = kernel.output
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
 
@@ -202,7 +206,7 @@ def _make_update(kernel: Kernel) -> Callable[..., Any]:
         params: Array, state: Array, turn: Array, time: float, gyr: Array, acc: Array, mag: Array, out: Array
     ) -> Any:
         if gyr.size != 3 or acc.size != 3 or mag.size != 3:
-            return -1
+            return -1 - WRONG_SHAPE
         last = state[LAST]
         dt = time - last if last == last else 0.0
         if not dt >= 0.0:
@@ -235,6 +239,10 @@ def _make_update(kernel: Kernel) -> Callable[..., Any]:
     return update
 
 
+_RUN_SIGNATURE: Final = "(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], u1[::1])"
+_UPDATE_SIGNATURE: Final = "(f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1])"
+
+
 @dataclass(frozen=True)
 class Kernel:
     """A filter's step together with the compiled loops around it.
@@ -253,6 +261,9 @@ class Kernel:
         ``output(p, s) -> tuple``, what is recorded.
     aligned : inlined function
         ``aligned(p, s, q) -> s``, the state after its attitude has been set from the sensors.
+    memoryless : bool
+        Whether the step also takes the samples from which the start was found. A filter must not: it would count
+        them twice.
 
     Notes
     -----
@@ -269,13 +280,14 @@ class Kernel:
     n_out: int
     output: Callable[..., Any] = same_state
     aligned: Callable[..., Any] = replace_attitude
+    memoryless: bool = False
 
     @cached_property
     def run(self) -> Callable[..., tuple[int, int]]:
         """The compiled loop over arrays."""
-        return compiled(_make_run(self), f"{self.name}-run")
+        return compiled(_make_run(self), f"{self.name}-run", _RUN_SIGNATURE)
 
     @cached_property
     def update(self) -> Callable[..., int]:
         """The compiled work for one live sample."""
-        return compiled(_make_update(self), f"{self.name}-update")
+        return compiled(_make_update(self), f"{self.name}-update", _UPDATE_SIGNATURE)

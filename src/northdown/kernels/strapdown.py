@@ -26,8 +26,13 @@ NORMALIZED_RATE = 1.0
 RK4 = 2.0
 CLOSED_FORM = 3.0
 
-INTEGRATORS: Final = ("first-order", "normalised-rate", "rk4", "closed-form")
+INTEGRATORS: Final = ("first-order", "normalized-rate", "rk4", "closed-form")
 """Names of the integrators; the position is the code."""
+
+
+def code(integrator: str) -> float:
+    """Code of an integrator's name, as kernels take it."""
+    return float(INTEGRATORS.index(integrator))
 
 
 @inline
