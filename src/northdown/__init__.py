@@ -1,3 +1,115 @@
-"""northdown: attitude and heading from inertial and magnetic sensors."""
+"""northdown: attitude and heading from inertial and magnetic sensors, with honest uncertainty.
+
+Conventions
+-----------
+These hold everywhere in the package.
+
+Units
+    SI and radians: rad/s, m/s², s. The magnetic field is in µT. Degrees appear only where a name ends in ``_deg``,
+    in ``as_euler(degrees=True)``, on plots and on the command line.
+Accelerometer
+    Measures specific force: +9.81 m/s² on the axis that points *up* at rest.
+Rotations
+    Body → navigation frame: ``v_n = mat_nb @ v_b``. Quaternions are Hamilton, (w, x, y, z), of unit norm; the public
+    type is `scipy.spatial.transform.Rotation` (whose own arrays are x, y, z, w).
+Frames
+    ``"NED"`` (default), ``"ENU"`` or ``"NWU"``; every result carries its frame. North is magnetic north.
+Arrays
+    (N, 3) float64; order of arguments gyr, acc, mag. A row with NaN in acc or mag means that there was no
+    sample. A sample of the gyroscope stands for the time since the sample before it.
+
+>>> import northdown as nd
+>>> recording = nd.simulate(20.0, seed=1)
+>>> orientation = nd.Mahony(kp=0.74).run(recording, frame="ENU")
+>>> orientation.frame, len(orientation)
+('ENU', 2001)
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from northdown.errors import FormatError, InputError, MissingDependencyError, NorthdownError
+from northdown.orientation import Flag, Orientation
+from northdown.recording import Recording
+
+if TYPE_CHECKING:
+    # For editors and type checkers only. At run time estimators are found by their files, see `__getattr__`.
+    from northdown import datasets, estimators, evaluation, frames, io, plots, simulation
+    from northdown.estimators.complementary import Complementary
+    from northdown.estimators.cross_product import CrossProduct
+    from northdown.estimators.gyro_integration import GyroIntegration
+    from northdown.estimators.madgwick import Madgwick
+    from northdown.estimators.mahony import Mahony
+    from northdown.estimators.tilt_compass import TiltCompass
+    from northdown.estimators.triad import Triad
+    from northdown.evaluation import align, attitude_error
+    from northdown.io import read, read_orientation, write_orientation, write_recording
+    from northdown.simulation import simulate
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Complementary",
+    "CrossProduct",
+    "Flag",
+    "FormatError",
+    "GyroIntegration",
+    "InputError",
+    "Madgwick",
+    "Mahony",
+    "MissingDependencyError",
+    "NorthdownError",
+    "Orientation",
+    "Recording",
+    "TiltCompass",
+    "Triad",
+    "align",
+    "attitude_error",
+    "datasets",
+    "estimators",
+    "evaluation",
+    "frames",
+    "io",
+    "plots",
+    "read",
+    "read_orientation",
+    "simulate",
+    "simulation",
+    "write_orientation",
+    "write_recording",
+]
+
+_MODULES = ("datasets", "estimators", "evaluation", "frames", "io", "plots", "simulation")
+_FUNCTIONS = {
+    "align": "evaluation",
+    "attitude_error": "evaluation",
+    "read": "io",
+    "read_orientation": "io",
+    "simulate": "simulation",
+    "write_orientation": "io",
+    "write_recording": "io",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load submodules, functions and estimators on first use, so that the import itself is cheap."""
+    if name in _MODULES:
+        return importlib.import_module(f"northdown.{name}")
+    if name in _FUNCTIONS:
+        value = getattr(importlib.import_module(f"northdown.{_FUNCTIONS[name]}"), name)
+        globals()[name] = value
+        return value
+    if name[:1].isupper():
+        from northdown.estimators import registry
+
+        for estimator in registry().values():
+            globals()[estimator.__name__] = estimator
+        if name in globals():
+            return globals()[name]
+    raise AttributeError(f"module 'northdown' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

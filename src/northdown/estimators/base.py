@@ -282,7 +282,7 @@ class Stream:
         if code == TIME_BACKWARDS:
             raise InputError(
                 expected(
-                    "time that does not run backwards",
+                    "finite time that does not run backwards",
                     f"{time:.6f} s",
                     at=at,
                     do="sort the recording by time (Recording.sort(), or --sort on the command line)",

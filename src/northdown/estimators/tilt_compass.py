@@ -26,7 +26,7 @@ from typing import Any
 from northdown.estimators.base import Estimator
 from northdown.frames import Frame
 from northdown.kernels.jit import inline
-from northdown.kernels.quaternion import dot, down_b, multiply
+from northdown.kernels.quaternion import dot, down_b, multiply, normalize
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 
@@ -39,7 +39,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         q = multiply(tilt_correction(q, acc), q)
     if has_heading(down_b(q), mag):
         q = turn_about_down(heading_error(q, mag), q)
-    return q
+    return normalize(q)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -209,7 +209,7 @@ def _make_update(kernel: Kernel) -> Callable[..., Any]:
             return -1 - WRONG_SHAPE
         last = state[LAST]
         dt = time - last if last == last else 0.0
-        if not dt >= 0.0:
+        if not dt >= 0.0 or time - time != 0.0:
             return -1 - TIME_BACKWARDS
         p = to_fixed_tuple(params, n_params)
         s = to_fixed_tuple(state[N_RUNNER:], n_state)

@@ -1,0 +1,289 @@
+"""What every estimator must do; a new file in estimators/ is tested here without being named."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import re
+import typing
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import northdown as nd
+from northdown import Flag, InputError, Recording
+from northdown.estimators import registry
+from northdown.simulation import Motion, SensorErrors, measure, random_motion, simulate
+
+EVERY = pytest.mark.parametrize("estimator", [e() for e in registry().values()], ids=list(registry()))
+
+RATE = 4000.0  # Hz
+# rad. At this rate first-order integration, (ωΔt)³/12 a step, errs by under 1e-4 and Madgwick, which corrects by 2βΔt
+# in every step however small the error, trembles by a few times 6e-5.
+NEAR_TRUTH = 1e-3
+# rad. Different machine code for one sample and for many may contract products differently.
+SAME = 1e-12
+
+
+def angle(a: Rotation, b: Rotation) -> float:
+    return float((a * b.inv()).magnitude().max())
+
+
+@pytest.fixture(scope="module")
+def noisy() -> Recording:
+    """A low-cost sensor with its magnetometer at a fifth of the rate."""
+    recording = simulate(20.0, rate=100.0, seed=3)
+    slow = np.arange(len(recording)) % 5 != 0
+    return dataclasses.replace(recording, mag=np.where(slow[:, None], np.nan, recording.mag))
+
+
+@pytest.fixture(scope="module")
+def exact() -> Recording:
+    """Error-free sensors on a body that turns without being shifted."""
+    motion = random_motion(10.0, RATE, np.random.default_rng(5), reach=0.0)
+    return measure(motion, SensorErrors(), np.random.default_rng(0))
+
+
+@EVERY
+def test_batch_is_stream(estimator, noisy):
+    batch = estimator.run(noisy, frame="ENU")
+    stream = estimator.stream(frame="ENU")
+    samples = zip(noisy.time, noisy.gyr, noisy.acc, noisy.mag, strict=True)
+    rows = [stream.update(*row, time=t) for t, *row in samples]
+    assert np.abs(np.array(rows) - batch.quat).max() < SAME
+
+
+@EVERY
+def test_rate_is_as_good_as_times(estimator, noisy):
+    batch = estimator.run(noisy)
+    stream = estimator.stream(rate=100.0)
+    last = [stream.update(g, a, m) for g, a, m in zip(noisy.gyr, noisy.acc, noisy.mag, strict=True)][-1]
+    assert np.abs(last - batch.quat[-1]).max() < 1e-9  # adding up periods rounds otherwise than reading times
+
+
+@EVERY
+def test_split_run_is_whole_run(estimator, noisy):
+    whole = estimator.run(noisy)
+    stream = estimator.stream()
+    parts = [stream.run(noisy[a:b]) for a, b in [(0, 1), (1, 1), (1, 700), (700, 701), (701, len(noisy))]]
+    assert np.array_equal(np.vstack([p.quat for p in parts]), whole.quat)
+    assert np.array_equal(np.concatenate([p.flags for p in parts]), whole.flags)
+
+
+@EVERY
+def test_mounting_turns_the_result(estimator, noisy):
+    turn = Rotation.random(random_state=np.random.default_rng(7))
+    plain = estimator.run(noisy)
+    turned = estimator.run(noisy.rotate_body(turn.as_matrix()))
+    # Rounding, amplified by the filter's own dynamics over 2000 steps
+    assert angle(turned.rotation * turn, plain.rotation) < 1e-8
+
+
+@EVERY
+@pytest.mark.parametrize("frame", ["ENU", "NWU"])
+def test_frame_turns_the_result(estimator, noisy, frame):
+    assert angle(estimator.run(noisy, frame=frame).rotation, estimator.run(noisy).to_frame(frame).rotation) < 1e-10
+    assert estimator.run(noisy, frame=frame).frame == frame
+
+
+@EVERY
+def test_truth_from_error_free_sensors(estimator, exact):
+    assert angle(estimator.run(exact).rotation, exact.reference.rotation) < NEAR_TRUTH
+
+
+@EVERY
+def test_irregular_steps(estimator):
+    rng = np.random.default_rng(11)
+    motion = random_motion(10.0, 2.0 * RATE, rng, reach=0.0)
+    keep = np.cumsum(rng.integers(1, 4, 45_000))
+    keep = keep[keep < len(motion.time)]
+    thinned = Motion(motion.time[keep], motion.rotation[keep], motion.acceleration[keep])
+    recording = measure(thinned, SensorErrors(), rng)
+    assert np.ptp(np.diff(recording.time)) > 0.9 / RATE
+    assert angle(estimator.run(recording).rotation, recording.reference.rotation) < NEAR_TRUTH
+
+
+@EVERY
+def test_start_given(estimator, exact):
+    blind = dataclasses.replace(exact, acc=np.full_like(exact.acc, np.nan), mag=np.full_like(exact.mag, np.nan))
+    start = Rotation.from_euler("ZYX", [0.3, -0.2, 2.9])
+    for frame in ("NED", "ENU"):
+        result = estimator.run(blind[:1], frame=frame, initial=start)
+        assert angle(result.rotation, start) < SAME
+        assert not result.flags.any()
+
+
+@EVERY
+def test_rows_of_nan(estimator, exact):
+    acc, mag = exact.acc.copy(), exact.mag.copy()
+    acc[10_000:10_800] = np.nan
+    acc[16_000:28_000:2, 1] = np.nan
+    mag[12_000:12_400] = np.nan
+    mag[18_000:26_000, 2] = np.nan
+    result = estimator.run(dataclasses.replace(exact, acc=acc, mag=mag))
+    assert np.isfinite(result.quat).all()
+    if "gyr" in estimator.uses:
+        assert angle(result.rotation, exact.reference.rotation) < NEAR_TRUTH
+    else:
+        there = ~np.isnan(acc).any(axis=1) & ~np.isnan(mag).any(axis=1)
+        assert angle(result.rotation[there], exact.reference.rotation[there]) < NEAR_TRUTH
+
+
+@EVERY
+def test_late_sensors_are_flagged_and_then_used(estimator, exact):
+    acc, mag = exact.acc.copy(), exact.mag.copy()
+    tilt, heading = 2_000, 6_000
+    acc[:tilt] = np.nan
+    mag[:heading] = np.nan
+    result = estimator.run(dataclasses.replace(exact, acc=acc, mag=mag))
+    assert np.array_equal(result.has(Flag.TILT_UNKNOWN), np.arange(len(exact)) < tilt)
+    assert np.array_equal(result.has(Flag.HEADING_UNKNOWN), np.arange(len(exact)) < heading)
+    assert angle(result.rotation[heading:], exact.reference.rotation[heading:]) < NEAR_TRUTH
+    if estimator.needs != ("acc", "mag"):
+        level = result.to_frame("NED").rotation[tilt:heading].as_matrix()[:, 2]
+        assert np.abs(level - exact.reference.rotation[tilt:heading].as_matrix()[:, 2]).max() < NEAR_TRUTH
+
+
+@EVERY
+def test_without_magnetometer_heading_is_flagged(estimator, exact):
+    if "mag" in estimator.needs:
+        with pytest.raises(InputError, match="expected acc and mag for"):
+            estimator.run(dataclasses.replace(exact, mag=None))
+        return
+    result = estimator.run(dataclasses.replace(exact, mag=None))
+    assert result.has(Flag.HEADING_UNKNOWN).all()
+    down = result.rotation.as_matrix()[:, 2]
+    assert np.abs(down - exact.reference.rotation.as_matrix()[:, 2]).max() < NEAR_TRUTH
+
+
+@EVERY
+def test_missing_sensor_is_named(estimator, exact):
+    for sensor in estimator.needs:
+        with pytest.raises(InputError, match=f"for {estimator.name}, got no {sensor}"):
+            estimator.run(dataclasses.replace(exact, **{sensor: None}))
+
+
+@EVERY
+def test_one_sample_and_none(estimator, exact):
+    one = estimator.run(exact[:1])
+    assert angle(one.rotation, exact.reference.rotation[:1]) < SAME
+    assert len(estimator.run(exact[:0])) == 0
+
+
+@EVERY
+@pytest.mark.parametrize("scale", [1e-6, 1e-2, 1e4])
+def test_size_of_the_field_does_not_matter(estimator, noisy, scale):
+    plain = estimator.run(noisy)
+    scaled = estimator.run(dataclasses.replace(noisy, mag=noisy.mag * scale, mag_unit="arbitrary"))
+    assert angle(scaled.rotation, plain.rotation) < 1e-8  # rounding, as for the mounting
+
+
+@EVERY
+def test_huge_rates_stay_on_the_sphere(estimator, exact):
+    part = exact[:2000]
+    for rate in (50.0, 2000.0, 1e6):
+        result = estimator.run(dataclasses.replace(part, gyr=np.full_like(part.gyr, rate)))
+        assert np.abs(np.linalg.norm(result.quat, axis=1) - 1.0).max() < SAME
+
+
+@EVERY
+def test_unit_norm_after_ten_million_steps(estimator):
+    n = 500_000
+    rng = np.random.default_rng(13)
+    gyr = rng.normal(0.0, 1.0, (n, 3)) + np.array([0.3, -0.2, 0.1])
+    acc = rng.normal(0.0, 0.5, (n, 3)) + np.array([0.0, 0.0, -9.81])
+    mag = rng.normal(0.0, 0.5, (n, 3)) + np.array([20.0, 0.0, 40.0])
+    stream = estimator.stream()
+    for k in range(20):
+        result = stream.run(Recording((np.arange(n) + k * n) * 0.01, gyr, acc, mag))
+    # one rounding of each component at the last normalisation, however many steps went before
+    assert np.abs(np.linalg.norm(result.quat, axis=1) - 1.0).max() < 1e-15
+
+
+@EVERY
+def test_gyroscope_held_through_short_gaps_only(estimator, exact):
+    gyr = exact.gyr.copy()
+    gyr[12_000:12_200] = np.nan
+    holed = dataclasses.replace(exact, gyr=gyr)
+    result = estimator.run(holed)
+    assert np.array_equal(np.flatnonzero(result.has(Flag.GYRO_HELD)), np.arange(12_000, 12_200))
+    assert np.isfinite(result.quat).all()
+    if "gyr" in estimator.uses:
+        with pytest.raises(InputError, match=r"every 0\.01001 s, got NaN for longer, at sample 12040; cut"):
+            estimator.run(holed, max_gap=0.01001)
+
+
+@EVERY
+def test_time_must_not_run_backwards(estimator, noisy):
+    time = noisy.time.copy()
+    time[7] = time[6]
+    assert np.isfinite(estimator.run(dataclasses.replace(noisy, time=time)).quat).all()
+    time[7] = time[5]
+    with pytest.raises(InputError, match=r"finite time that does not run backwards, .*, at sample 7; sort"):
+        estimator.run(dataclasses.replace(noisy, time=time))
+
+
+@EVERY
+def test_a_refused_update_changes_nothing(estimator, noisy):
+    good, spoiled = estimator.stream(rate=100.0), estimator.stream(rate=100.0)
+    for k in range(50):
+        row = (noisy.gyr[k], noisy.acc[k], noisy.mag[k])
+        for bad in (
+            (np.full(3, np.inf), row[1], row[2]),
+            (row[0], [0.0, 1.0], row[2]),
+            (row[0], row[1], "north"),
+        ):
+            # an infinite rate does not concern an estimator that does not use it
+            if bad[0] is not row[0] and "gyr" not in estimator.uses:
+                continue
+            with pytest.raises(InputError):
+                spoiled.update(*bad)
+        with pytest.raises(InputError, match="backwards"):
+            spoiled.update(*row, time=-1.0 if k else -np.inf)
+        a, b = good.update(*row), spoiled.update(*row)
+        assert np.array_equal(a, b)
+
+
+@EVERY
+def test_update_takes_lists_and_other_types(estimator, noisy):
+    plain, other = estimator.stream(rate=100.0), estimator.stream(rate=100.0)
+    for k in range(3):
+        row = [noisy.gyr[k], noisy.acc[k], noisy.mag[k]]
+        expected = plain.update(*row)
+        given = other.update(row[0].tolist(), np.asfortranarray(np.tile(row[1], (2, 1)))[1], tuple(row[2]))
+        assert np.array_equal(given, expected)
+
+
+@EVERY
+def test_parameters_are_described_and_checked(estimator):
+    cls = type(estimator)
+    doc = inspect.getdoc(cls)
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        block = re.search(rf"^{field.name}( : |, )[^\n]*\n((?:    .*\n|\n)+)", doc + "\n", re.M) or re.search(
+            rf"^[\w, ]*\b{field.name}\b[^\n]* : [^\n]*\n((?:    .*\n|\n)+)", doc + "\n", re.M
+        )
+        assert block, f"{cls.__name__}.{field.name} is not described"
+        if typing.get_origin(hints[field.name]) is typing.Literal:
+            with pytest.raises(InputError, match=f"{field.name} to be one of"):
+                cls(**{field.name: "nonsense"})
+        elif hints[field.name] is float:
+            assert re.search(r"[Rr]aising", block[0]), f"say what raising {field.name} does"
+            for bad in (float("nan"), float("inf"), "much", None):
+                with pytest.raises(InputError, match=field.name):
+                    cls(**{field.name: bad})
+    with pytest.raises(TypeError, match="no_such_parameter"):
+        cls(no_such_parameter=1.0)
+
+
+@EVERY
+def test_names_agree(estimator):
+    cls = type(estimator)
+    assert cls.__module__.rsplit(".", 1)[1] == estimator.name.replace("-", "_")
+    assert getattr(nd, cls.__name__) is cls
+    assert cls.__name__ in nd.__all__
+    source = inspect.getsource(nd)
+    static = [a.name for n in ast.walk(ast.parse(source)) if isinstance(n, ast.ImportFrom) for a in n.names]
+    assert cls.__name__ in static, "add it to the TYPE_CHECKING block of northdown/__init__.py, for editors"
