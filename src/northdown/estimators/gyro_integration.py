@@ -57,7 +57,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
 
 @inline
-def aligned(p: Any, s: Any, q: Any) -> Any:
+def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
     """State for an attitude found from the sensors."""
     return q + euler_in_frame((p[2], p[3], p[4], p[5]), q)
 

@@ -55,7 +55,7 @@ Step = Callable[..., tuple[float, ...]]
 
 
 @inline
-def replace_attitude(p: tuple[float, ...], s: Any, q: Any) -> Any:
+def replace_attitude(p: tuple[float, ...], s: Any, q: Any, heading_known: bool) -> Any:
     """Put the attitude found at the start into the state (the default of `Kernel.aligned`)."""
     return q + s[4:]
 
@@ -64,6 +64,12 @@ def replace_attitude(p: tuple[float, ...], s: Any, q: Any) -> Any:
 def same_state(p: tuple[float, ...], s: Any) -> Any:
     """What is recorded of the state: all of it (the default of `Kernel.output`)."""
     return s
+
+
+@inline
+def no_flags(p: tuple[float, ...], s: Any) -> int:
+    """Flags of a filter that has none (the default of `Kernel.flagged`)."""
+    return 0
 
 
 @inline
@@ -80,7 +86,7 @@ def start_tilt(q: Any, acc: Any) -> Any:
 
 def _make_tick(kernel: Kernel) -> Callable[..., Any]:
     """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
-    step, aligned, memoryless = kernel.step, kernel.aligned, kernel.memoryless
+    step, aligned, flagged, memoryless = kernel.step, kernel.aligned, kernel.flagged, kernel.memoryless
 
     @inline
     def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
@@ -99,6 +105,7 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
                 code = GYRO_GAP
         if pending == 0.0:
             s = step(p, s, dt, gyr, acc, mag)
+            flags |= flagged(p, s)
         else:
             nothing = (_NAN, _NAN, _NAN)
             tilt_pending = pending != float(HEADING_UNKNOWN)
@@ -115,7 +122,7 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
                 q = turn_about_down(heading_error(q, mag), q)
                 pending -= float(HEADING_UNKNOWN)
             if tilt_now or heading_now:
-                s = aligned(p, s, q)
+                s = aligned(p, s, q, pending == 0.0)
                 if memoryless:
                     s = step(p, s, 0.0, gyr, acc, mag)
             flags |= int(pending)
@@ -260,7 +267,10 @@ class Kernel:
     output : inlined function
         ``output(p, s) -> tuple``, what is recorded.
     aligned : inlined function
-        ``aligned(p, s, q) -> s``, the state after its attitude has been set from the sensors.
+        ``aligned(p, s, q, heading_known) -> s``, the state after its attitude has been set from the sensors: called
+        when tilt is found, and again when heading is, or once for both.
+    flagged : inlined function
+        ``flagged(p, s) -> int``, further flags of the sample just taken.
     memoryless : bool
         Whether the step also takes the samples from which the start was found. A filter must not: it would count
         them twice.
@@ -280,6 +290,7 @@ class Kernel:
     n_out: int
     output: Callable[..., Any] = same_state
     aligned: Callable[..., Any] = replace_attitude
+    flagged: Callable[..., int] = no_flags
     memoryless: bool = False
 
     @cached_property
