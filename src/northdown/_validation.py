@@ -3,35 +3,56 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Sequence
-from typing import Any
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from northdown.errors import InputError, expected
 
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 
 def as_float_array(name: str, value: Any) -> FloatArray:
-    """Convert to a C-ordered float64 array; anything that is not real numbers is an error."""
+    """Convert to a float64 array, C-ordered and writable; anything that is not real numbers is an error.
+
+    None, pandas' NA and masked elements become NaN. An array that is already as wanted is returned as it is, without
+    a copy; a read-only one is copied, as the compiled kernels do not take it otherwise.
+    """
     try:
+        if isinstance(value, np.ma.MaskedArray):  # asarray would reveal what is under the mask
+            value = np.where(np.ma.getmaskarray(value), math.nan, value.data.astype(np.float64))
         array = np.asarray(value)
+        if array.dtype.kind == "O":
+            array = np.array([_as_float(v) for v in array.flat], dtype=np.float64).reshape(array.shape)
         if array.dtype.kind not in "fiub":
-            if array.dtype.kind == "O":  # None among numbers, or pandas' NA
-                array = np.array(
-                    [[math.nan if v is None else v for v in row] for row in array]
-                    if array.ndim == 2
-                    else [math.nan if v is None else v for v in array]
-                )
-            if array.dtype.kind not in "fiub":
-                raise TypeError
-        return np.ascontiguousarray(array, dtype=np.float64)
-    except (TypeError, ValueError):
+            raise TypeError
+        with np.errstate(over="ignore"):  # extended precision beyond float64 becomes infinity, which is caught later
+            return np.require(array, np.float64, ["C", "A", "W"])
+    except (TypeError, ValueError, OverflowError):
         kind = getattr(value, "dtype", type(value).__name__)
-        raise InputError(expected(f"real numbers in {name}", f"{kind}", do=f"convert {name} first")) from None
+        do = f"convert {name} first"
+        if getattr(kind, "kind", "") in ("M", "m"):
+            do = f"convert {name} to seconds first"
+        elif isinstance(value, (list, tuple)):
+            do = f"see that all rows of {name} are numbers and equally long"
+        raise InputError(expected(f"real numbers in {name}", f"{kind}", do=do)) from None
+
+
+def _as_float(value: Any) -> float:
+    """One element of an array of objects."""
+    if value is None or type(value).__name__ == "NAType":
+        return math.nan
+    if isinstance(value, (numbers.Real, Decimal, np.bool_)):
+        return float(value)
+    raise TypeError
 
 
 def check_vectors(name: str, value: Any, length: int | None = None) -> FloatArray:
@@ -91,14 +112,38 @@ def check_increasing(time: FloatArray) -> None:
 
 def check_mask(name: str, value: Any, length: int) -> BoolArray:
     """Check an (N,) array of booleans (0 and 1 are accepted)."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of unequal length
+        raise InputError(expected(f"{name} of shape ({length},)", type(value).__name__)) from None
     if array.ndim == 2 and 1 in array.shape:
         array = array.ravel()
     if array.shape != (length,):
         raise InputError(expected(f"{name} of shape ({length},)", f"shape {array.shape}"))
-    if array.dtype != np.bool_ and not np.isin(array, (0, 1)).all():
-        raise InputError(expected(f"booleans in {name}", f"values of type {array.dtype}"))
+    if array.dtype != np.bool_ and (array.dtype.kind not in "fiu" or not ((array == 0) | (array == 1)).all()):
+        raise InputError(expected(f"booleans in {name}", f"other values, of type {array.dtype}"))
     return array.astype(np.bool_)
+
+
+def check_index(value: Any, length: int) -> slice | npt.NDArray[Any]:
+    """Check a slice, an (N,) mask or an array of indices into `length` samples."""
+    if isinstance(value, slice):
+        return value
+    if hasattr(value, "__array__"):  # a pandas Series too
+        value = np.asarray(value)
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        if value.dtype == np.bool_:
+            return check_mask("the mask", value, length)
+        if not value.size:
+            return value.astype(np.intp)
+        if value.dtype.kind in "iu":
+            outside = (value >= length) | (value < -length)
+            if outside.any():
+                got = f"{value[np.argmax(outside)]}"
+                raise InputError(expected(f"indices of {length} samples", got, do="leave out those beyond the end"))
+            return value
+    kind = f"{value.dtype} of shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
+    raise InputError(expected("a slice, a mask or a one-dimensional array of indices", kind))
 
 
 def check_number(
@@ -117,6 +162,8 @@ def check_number(
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(expected(f"a number for {name}", repr(value))) from None
+    except OverflowError:
+        raise InputError(expected(f"a number for {name}", "one beyond 1e308")) from None
     bound = f" above {above:g}" if above is not None else ""
     if above is None and math.isfinite(low):
         bound = f" between {low:g} and {high:g}" if math.isfinite(high) else f" of at least {low:g}"
@@ -128,6 +175,39 @@ def check_number(
 
 def check_choice(name: str, value: Any, choices: Sequence[str]) -> str:
     """Check that a string is one of a few."""
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         raise InputError(expected(f"{name} to be one of {', '.join(choices)}", repr(value)))
     return str(value)
+
+
+def check_rotation(name: str, value: Any) -> Rotation:
+    """Check a SciPy Rotation, single or of any length."""
+    from scipy.spatial.transform import Rotation
+
+    if not isinstance(value, Rotation):
+        raise InputError(expected(f"{name} as a SciPy Rotation", type(value).__name__))
+    return value
+
+
+def check_single_rotation(name: str, value: Any) -> Any:
+    """Check None, or a single SciPy Rotation; one of length 1 is made single."""
+    if value is None or check_rotation(name, value).single:
+        return value
+    if len(value) != 1:
+        raise InputError(expected(f"{name} as a single rotation", f"{len(value)} of them"))
+    return value[0]
+
+
+def check_quat(value: Any, n: int) -> FloatArray:
+    """Check (n, 4) quaternions w, x, y, z of unit norm within 1 %, and make it exactly one."""
+    quat = as_float_array("quat", value)
+    if quat.shape != (n, 4):
+        raise InputError(expected(f"quat of shape ({n}, 4), order w, x, y, z", f"shape {quat.shape}"))
+    norm = np.sqrt((quat * quat).sum(axis=1))
+    bad = ~(np.abs(norm - 1.0) < 0.01)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(expected("unit quaternions", f"norm {norm[row]:g}", at=row, do="leave out missing samples"))
+    # those that are unit but for rounding stay as they are, so that copies and files keep every digit
+    unit: FloatArray = quat / np.where(np.abs(norm - 1.0) < 1e-14, 1.0, norm)[:, None]
+    return unit

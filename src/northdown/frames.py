@@ -97,6 +97,7 @@ def mounting_matrix(spec: str) -> FloatArray:
         When the text does not name each axis once, or when the axes would be left-handed.
     """
     parts = [p.strip().lower() for p in spec.split(",")] if isinstance(spec, str) else []
+    parts = [p.replace("−", "-") for p in parts]  # a typeset minus, as in messages and documents
     matches = [m for p in parts if (m := re.fullmatch(r"([+-]?)([xyz])", p))]
     if len(parts) != 3 or len(matches) != 3:
         raise InputError(expected("a mounting such as 'y,-x,z'", repr(spec), do="name three signed axes"))
@@ -128,7 +129,8 @@ def as_euler(rotation: Rotation, convention: str = "zyx") -> FloatArray:
 
     Notes
     -----
-    At pitch ±90° only the sum or difference of the other two is defined; roll is then set to 0.
+    At pitch ±90° only the sum or difference of the other two is defined; roll is then set to 0. That is done where
+    cos(pitch) is below 1e-9.
     """
     check_choice("convention", convention, tuple(EULER_COLUMNS))
     mat = rotation.as_matrix()
@@ -150,20 +152,36 @@ def as_euler(rotation: Rotation, convention: str = "zyx") -> FloatArray:
 
 
 def from_euler(angles: npt.ArrayLike, convention: str = "zyx") -> Rotation:
-    """Rotation body → navigation frame from Euler angles (N, 3) or (3,) in radians; inverse of `as_euler`."""
+    """Rotation body → navigation frame from Euler angles (N, 3) or (3,) in radians; inverse of `as_euler`.
+
+    Raises
+    ------
+    InputError
+        On another shape, or an angle that is not finite.
+    """
     from scipy.spatial.transform import Rotation
 
     check_choice("convention", convention, tuple(EULER_COLUMNS))
     a = as_float_array("angles", angles)
     if a.ndim not in (1, 2) or a.shape[-1] != 3:
         raise InputError(expected("angles of shape (3,) or (N, 3)", f"shape {a.shape}"))
+    bad = ~np.isfinite(np.atleast_2d(a)).all(axis=1)
+    if bad.any():
+        raise InputError(expected("finite angles", "NaN or infinity", at=int(np.argmax(bad))))
     if convention == "rfu":
         return Rotation.from_euler("ZXY", np.stack([-a[..., 2], a[..., 0], a[..., 1]], axis=-1))
     return Rotation.from_euler("ZYX", a[..., ::-1])
 
 
 def rate_from_euler_rate(roll: float, pitch: float) -> FloatArray:
-    """Matrix (3, 3) from (roll, pitch, yaw) rates to body rates, zyx convention (K06 (2.8), corrected)."""
+    """Matrix (3, 3) from (roll, pitch, yaw) rates to body rates, zyx convention (K06 (2.8), corrected).
+
+    Parameters
+    ----------
+    roll, pitch : float
+        Euler angles, rad.
+    """
+    roll, pitch = check_number("roll", roll, unit="rad"), check_number("pitch", pitch, unit="rad")
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     return np.array([[1.0, 0.0, -sp], [0.0, cr, cp * sr], [0.0, -sr, cp * cr]])
 
@@ -171,11 +189,17 @@ def rate_from_euler_rate(roll: float, pitch: float) -> FloatArray:
 def euler_rate_from_rate(roll: float, pitch: float) -> FloatArray:
     """Matrix (3, 3) from body rates to (roll, pitch, yaw) rates, zyx convention (K06 (2.9)).
 
+    Parameters
+    ----------
+    roll, pitch : float
+        Euler angles, rad.
+
     Raises
     ------
     InputError
         Within 1e-9 of pitch ±90°, where yaw and roll rates are unbounded.
     """
+    roll, pitch = check_number("roll", roll, unit="rad"), check_number("pitch", pitch, unit="rad")
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     if abs(cp) < 1e-9:
         raise InputError(

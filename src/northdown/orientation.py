@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,11 @@ from northdown._validation import (
     FloatArray,
     as_float_array,
     check_increasing,
+    check_index,
     check_no_infinity,
+    check_quat,
+    check_rotation,
+    check_single_rotation,
     check_time,
     check_vectors,
 )
@@ -38,6 +42,10 @@ class Flag(enum.IntFlag):
     """The gyroscope had no sample; its last one was used."""
     LONG_STEP = 8
     """More time than the maximum gap has passed since the last sample."""
+    MAG_REJECTED = 16
+    """The field departed so far from its reference that the sample was given less than 1 % of its weight."""
+    NEAR_SINGULAR = 32
+    """The attitude is near one in which the method's angles are undefined; do not trust it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +66,23 @@ class Orientation:
         true rotation = exp(δ) · estimate. None where the method has none.
     gyr_bias : (N, 3) array, optional
         Estimated gyroscope bias, rad/s, in body axes.
+    gyr_bias_sigma : (N, 3) array, optional
+        Standard deviation of `gyr_bias`, rad/s.
     flags : (N,) array of int, optional
         Bits of `Flag`; zero when not given.
+    diagnostics : mapping of str to (N,) array
+        Statistics behind the flags; the estimator's docstring names them, and the thresholds.
     name : str
         Where it comes from: the estimator's or the recording's name.
+
+    Raises
+    ------
+    InputError
+        On wrong shapes, time that runs backwards, or quaternions that are not of unit norm.
+
+    Notes
+    -----
+    A value: methods return new orientations. These may share arrays, as NumPy's views do, also with the caller.
     """
 
     time: FloatArray
@@ -69,7 +90,9 @@ class Orientation:
     frame: Frame = "NED"
     covariance: FloatArray | None = None
     gyr_bias: FloatArray | None = None
+    gyr_bias_sigma: FloatArray | None = None
     flags: npt.NDArray[np.integer[Any]] = field(default=None)  # type: ignore[arg-type]
+    diagnostics: Mapping[str, FloatArray] = field(default_factory=dict)
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -78,7 +101,7 @@ class Orientation:
         set_field(self, "frame", check_frame(self.frame))
         check_increasing(self.time)
         n = len(self.time)
-        set_field(self, "quat", _check_quat(self.quat, n))
+        set_field(self, "quat", check_quat(self.quat, n))
         if self.covariance is not None:
             cov = as_float_array("covariance", self.covariance)
             if cov.shape != (n, 3, 3):
@@ -87,21 +110,38 @@ class Orientation:
             set_field(self, "covariance", cov)
         if self.gyr_bias is not None:
             set_field(self, "gyr_bias", check_vectors("gyr_bias", self.gyr_bias, n))
+        if self.gyr_bias_sigma is not None:
+            set_field(self, "gyr_bias_sigma", check_vectors("gyr_bias_sigma", self.gyr_bias_sigma, n))
         flags = np.zeros(n, np.uint8) if self.flags is None else np.asarray(self.flags)
         if flags.shape != (n,) or flags.dtype.kind not in "iub":
             raise InputError(expected(f"flags of shape ({n},) of integers", f"shape {flags.shape}, {flags.dtype}"))
+        if ((flags < 0) | (flags > 255)).any():
+            raise InputError(expected("flags between 0 and 255", f"{flags.min()} to {flags.max()}"))
         set_field(self, "flags", flags.astype(np.uint8))
+        diagnostics = {key: as_float_array(key, value) for key, value in self.diagnostics.items()}
+        for key, array in diagnostics.items():
+            if array.shape != (n,):
+                raise InputError(expected(f"{key} of shape ({n},) in diagnostics", f"shape {array.shape}"))
+        set_field(self, "diagnostics", diagnostics)
 
     @classmethod
     def _trusted(cls, **values: Any) -> Orientation:
         """Build from arrays that northdown itself has just computed, without checking them again."""
         self = object.__new__(cls)
-        self.__dict__.update({"covariance": None, "gyr_bias": None, "name": ""} | values)
+        absent: dict[str, Any] = {
+            "covariance": None,
+            "gyr_bias": None,
+            "gyr_bias_sigma": None,
+            "diagnostics": {},
+            "name": "",
+        }
+        self.__dict__.update(absent | values)
         return self
 
     @classmethod
     def from_rotation(cls, time: npt.ArrayLike, rotation: Rotation, frame: str = "NED", **other: Any) -> Orientation:
         """Orientation from a SciPy `Rotation` (body → frame) of length N."""
+        check_rotation("rotation", rotation)
         quat = np.roll(np.atleast_2d(rotation.as_quat()), 1, axis=-1)
         return cls(check_time(time), quat, check_frame(frame), **other)
 
@@ -117,13 +157,13 @@ class Orientation:
 
     def __getitem__(self, index: slice | npt.NDArray[Any]) -> Orientation:
         """Part of the orientation, by slice, mask or increasing indices."""
-        if not isinstance(index, (slice, np.ndarray)):
-            raise InputError(expected("a slice, a mask or an array of indices", repr(index)))
-        pick: dict[str, Any] = {k: v[index] for k, v in self._arrays()}
+        chosen = check_index(index, len(self))
+        pick: dict[str, Any] = {k: v[chosen] for k, v in self._arrays()}
+        pick["diagnostics"] = {k: v[chosen] for k, v in self.diagnostics.items()}
         return replace(self, **pick)
 
     def _arrays(self) -> Iterator[tuple[str, Any]]:
-        for key in ("time", "quat", "covariance", "gyr_bias", "flags"):
+        for key in ("time", "quat", "covariance", "gyr_bias", "gyr_bias_sigma", "flags"):
             value = getattr(self, key)
             if value is not None:
                 yield key, value
@@ -160,9 +200,15 @@ class Orientation:
             Turns the navigation frame; the covariance turns with it.
         right : Rotation, optional
             Turns the body frame, as when the sensor is remounted; the gyroscope bias turns with it.
+
+        Raises
+        ------
+        InputError
+            When one of them is not a single SciPy Rotation.
         """
+        left, right = check_single_rotation("left", left), check_single_rotation("right", right)
         result = self.rotation
-        cov, bias = self.covariance, self.gyr_bias
+        cov, bias, sigma = self.covariance, self.gyr_bias, self.gyr_bias_sigma
         if left is not None:
             result = left * result
             mat = left.as_matrix()
@@ -170,7 +216,10 @@ class Orientation:
         if right is not None:
             result = result * right
             bias = None if bias is None else right.inv().apply(bias)
-        return replace(self, quat=np.roll(result.as_quat(), 1, axis=-1), covariance=cov, gyr_bias=bias)
+            # the sigmas of single axes say nothing of other axes
+            sigma = None
+        quat = np.roll(result.as_quat(), 1, axis=-1)
+        return replace(self, quat=quat, covariance=cov, gyr_bias=bias, gyr_bias_sigma=sigma)
 
     def as_euler(self, convention: str = "zyx", *, degrees: bool = False) -> FloatArray:
         """Euler angles, (N, 3), in rad unless `degrees`.
@@ -189,14 +238,15 @@ class Orientation:
         return np.rad2deg(angles) if degrees else angles
 
     def at(self, time: npt.ArrayLike) -> Orientation:
-        """Orientation at other times within the span, by spherical linear interpolation.
+        """Orientation at other times (s) within the span, not decreasing, by spherical linear interpolation.
 
-        Covariance and bias are interpolated linearly; flags of both neighbours are combined.
+        Covariance and bias are interpolated linearly; flags of both neighbours are combined. Where several samples
+        have the time that is asked for, the last of them is taken. Gaps are bridged like any other step.
 
         Raises
         ------
         InputError
-            When a time lies outside the span, or there is nothing to interpolate.
+            When a time lies outside the span or runs backwards, or there is nothing to interpolate.
         """
         from scipy.spatial.transform import Rotation
 
@@ -206,10 +256,10 @@ class Orientation:
             span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "no samples"
             got = f"{t[0]:g} to {t[-1]:g} s" if len(t) else "no times"
             raise InputError(expected(f"times within the orientation's span ({span})", got, do="cut the times first"))
-        right = np.clip(np.searchsorted(self.time, t, side="left"), 1 if len(self) > 1 else 0, len(self) - 1)
-        left = np.maximum(right - 1, 0)
+        left = np.searchsorted(self.time, t, side="right") - 1
+        right = np.minimum(left + 1, len(self) - 1)
         step = self.time[right] - self.time[left]
-        u = np.divide(t - self.time[left], step, out=np.ones_like(t), where=step > 0.0)
+        u = np.divide(t - self.time[left], step, out=np.zeros_like(t), where=step > 0.0)
         first = self.rotation[left]
         turn = (first.inv() * self.rotation[right]).as_rotvec() * u[:, None]
         quat = np.roll((first * Rotation.from_rotvec(turn)).as_quat(), 1, axis=-1)
@@ -220,14 +270,16 @@ class Orientation:
             k = u.reshape(-1, *[1] * (x.ndim - 1))
             return x[left] * (1.0 - k) + x[right] * k
 
-        flags = self.flags[left] * (u < 1.0) | self.flags[right] * (u > 0.0)
+        flags = self.flags[left] | self.flags[right] * (u > 0.0)
         return replace(
             self,
             time=t,
             quat=quat,
             covariance=blend(self.covariance),
             gyr_bias=blend(self.gyr_bias),
+            gyr_bias_sigma=blend(self.gyr_bias_sigma),
             flags=flags,
+            diagnostics={k: x[left] * (1.0 - u) + x[right] * u for k, x in self.diagnostics.items()},
         )
 
     def to_pandas(self, convention: str = "zyx") -> pd.DataFrame:
@@ -243,20 +295,9 @@ class Orientation:
                 columns[f"cov_{'xyz'[i]}{'xyz'[j]}"] = self.covariance[:, i, j]
         if self.gyr_bias is not None:
             columns |= {f"gyr_bias_{c}": self.gyr_bias[:, i] for i, c in enumerate("xyz")}
+        if self.gyr_bias_sigma is not None:
+            columns |= {f"gyr_bias_sigma_{c}": self.gyr_bias_sigma[:, i] for i, c in enumerate("xyz")}
         columns["flags"] = self.flags
         table = pd.DataFrame(columns)
         table.attrs = {"frame": self.frame, "name": self.name}
         return table
-
-
-def _check_quat(value: Any, n: int) -> FloatArray:
-    quat = as_float_array("quat", value)
-    if quat.shape != (n, 4):
-        raise InputError(expected(f"quat of shape ({n}, 4), order w, x, y, z", f"shape {quat.shape}"))
-    norm = np.sqrt((quat * quat).sum(axis=1))
-    bad = ~(np.abs(norm - 1.0) < 0.01)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InputError(expected("unit quaternions", f"norm {norm[row]:g}", at=row, do="leave out missing samples"))
-    unit: FloatArray = quat / norm[:, None]
-    return unit

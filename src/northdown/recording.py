@@ -11,18 +11,23 @@ import numpy.typing as npt
 from northdown._validation import (
     BoolArray,
     FloatArray,
+    as_float_array,
     check_choice,
+    check_index,
     check_mask,
     check_number,
     check_time,
     check_vectors,
 )
-from northdown.checks import Findings, check_recording
+from northdown.checks import Findings, check_recording, sampling_step
 from northdown.errors import InputError, expected
 from northdown.frames import Frame, check_frame, mounting_matrix
 from northdown.orientation import Orientation
 
 SENSORS = ("gyr", "acc", "mag")
+
+# Bounds the memory that a mistyped rate can ask for.
+_MOST_SAMPLES = 1e8
 
 ReferenceOffset = Literal["none", "heading", "rotations"]
 
@@ -47,7 +52,7 @@ class Recording:
     movement : (N,) array of bool, optional
         Samples over which errors are to be counted.
     frame : {"NED", "ENU", "NWU"}
-        Navigation frame in which results are wanted, and in which `reference` is.
+        Navigation frame in which results are wanted. `reference` carries its own.
     name : str
         For tables and figures.
     mag_unit : {"uT", "arbitrary"}
@@ -60,6 +65,11 @@ class Recording:
     ------
     InputError
         On wrong shapes, infinite values, or when there is no sensor at all.
+
+    Notes
+    -----
+    A value: every method returns a new recording. float64 arrays that can be written to are kept as they are, without
+    a copy, and parts of a recording may share them; whoever writes into one writes into all. Anything else is copied.
     """
 
     time: FloatArray
@@ -95,17 +105,15 @@ class Recording:
         return len(self.time)
 
     def __repr__(self) -> str:
-        span = f"{self.time[-1] - self.time[0]:.1f} s at {self.rate:.1f} Hz" if len(self) > 1 else "no duration"
+        span = f"{self.duration:.1f} s at {self.rate:.1f} Hz" if self.rate > 0.0 else "no duration"
         sensors = "+".join(s for s in SENSORS if getattr(self, s) is not None)
         tail = ", with reference" if self.reference is not None else ""
         return f"<Recording {self.name or 'unnamed'}: {len(self)} samples, {span}, {sensors}, {self.frame}{tail}>"
 
     @property
     def rate(self) -> float:
-        """Median sampling rate, Hz; NaN with fewer than two samples."""
-        if len(self) < 2:
-            return float("nan")
-        step = float(np.median(np.diff(self.time)))
+        """Sampling rate in Hz, from the mean step without gaps and steps backwards; NaN when there is none."""
+        step = sampling_step(self.time)
         return 1.0 / step if step > 0.0 else float("nan")
 
     @property
@@ -119,11 +127,22 @@ class Recording:
         Returns
         -------
         Findings
-            True rate and jitter, gaps, duplicates, time that runs backwards, saturated and stuck samples,
-            implausible magnitudes with the unit they suggest, a resting accelerometer that contradicts the
-            declared frame, and a magnetic norm that varies. ``print`` it.
+            True rate and jitter, gaps, duplicates, time that runs backwards or is not in seconds; missing,
+            saturated, stuck and repeated samples; implausible magnitudes with the unit they suggest; gyroscope,
+            accelerometer and magnetometer whose axes, sense or unit contradict each other; a magnetic norm or dip
+            that varies; a resting accelerometer that contradicts the declared frame, or the reference.
+            ``print`` it.
         """
-        return check_recording(self.time, self.gyr, self.acc, self.mag, frame=self.frame, mag_unit=self.mag_unit)
+        return check_recording(
+            self.time,
+            self.gyr,
+            self.acc,
+            self.mag,
+            frame=self.frame,
+            mag_unit=self.mag_unit,
+            reference=self.reference,
+            reference_offset=self.reference_offset,
+        )
 
     def _select(self, index: Any) -> Recording:
         picked: dict[str, Any] = {
@@ -133,12 +152,13 @@ class Recording:
 
     def __getitem__(self, index: slice | npt.NDArray[Any]) -> Recording:
         """Samples by slice, mask or indices; the reference is kept whole, as it has its own times."""
-        if not isinstance(index, (slice, np.ndarray)):
-            raise InputError(expected("a slice, a mask or an array of indices", repr(index)))
-        return self._select(index)
+        return self._select(check_index(index, len(self)))
 
     def between(self, start: float, stop: float) -> Recording:
-        """Samples with start ≤ time < stop (s)."""
+        """Samples with start ≤ time < stop (s); infinity is allowed."""
+        first, last = as_float_array("start", start), as_float_array("stop", stop)
+        if first.ndim or last.ndim or not first <= last:
+            raise InputError(expected("two times, start not after stop", f"{start!r} and {stop!r}"))
         return self._select((self.time >= start) & (self.time < stop))
 
     def sort(self) -> Recording:
@@ -160,9 +180,14 @@ class Recording:
         """Express all vectors in other body axes, v' = mat v, with a rotation matrix (3, 3)."""
         from scipy.spatial.transform import Rotation
 
-        m = np.asarray(mat, dtype=np.float64)
-        if m.shape != (3, 3) or not np.allclose(m @ m.T, np.eye(3), atol=1e-9) or np.linalg.det(m) < 0.0:
-            raise InputError(expected("a rotation matrix of shape (3, 3)", f"shape {m.shape}, not a rotation"))
+        m = as_float_array("mat", mat)
+        if m.shape != (3, 3):
+            raise InputError(expected("a rotation matrix of shape (3, 3)", f"shape {m.shape}"))
+        error = float(np.abs(m @ m.T - np.eye(3)).max())
+        if not error < 1e-9:
+            raise InputError(expected("a rotation matrix", f"rows that are off orthonormal by {error:.2g}"))
+        if np.linalg.det(m) < 0.0:
+            raise InputError(expected("a rotation matrix", "one that mirrors space (determinant −1)"))
         turned: dict[str, Any] = {s: None if getattr(self, s) is None else getattr(self, s) @ m.T for s in SENSORS}
         reference = self.reference
         if reference is not None and self.reference_offset != "rotations":
@@ -176,23 +201,37 @@ class Recording:
         interpolated linearly between their own samples, and stay missing across their gaps longer than two of the new
         periods or two of their own. No anti-aliasing filter is applied.
 
+        Parameters
+        ----------
+        rate : float
+            New rate, Hz.
+
         Raises
         ------
         InputError
-            With fewer than two samples, time that does not increase, or missing gyroscope samples.
+            With fewer than two samples, time that does not increase, missing gyroscope samples, or a rate that would
+            need more than 100 million samples.
         """
         rate = check_number("rate", rate, above=0.0, unit="Hz")
         dt = np.diff(self.time)
-        if len(self) < 2 or (dt <= 0.0).any():
-            bad = int(np.argmax(dt <= 0.0)) + 1 if len(self) > 1 else 0
-            raise InputError(expected("two samples or more, of increasing time", "other", at=bad, do="sort it first"))
+        if len(self) < 2:
+            raise InputError(expected("two samples or more", f"{len(self)}"))
+        if (dt <= 0.0).any():
+            at = int(np.argmax(dt <= 0.0)) + 1
+            do = "sort the recording (Recording.sort()) and drop samples of equal time"
+            raise InputError(expected("time that increases", f"a step of {dt[at - 1]:g} s", at=at, do=do))
+        if self.duration * rate > _MOST_SAMPLES:
+            got = f"{self.duration:g} s at {rate:g} Hz"
+            raise InputError(expected(f"at most {_MOST_SAMPLES:g} samples", got, do="choose a lower rate"))
         n = int(np.floor(self.duration * rate * (1.0 + 1e-12))) + 1
         t = self.time[0] + np.arange(n) / rate
         fields: dict[str, Any] = {}
         if self.gyr is not None:
             missing = np.isnan(self.gyr).any(axis=1)
             if missing.any():
-                raise InputError(expected("a gyroscope without missing samples", "NaN", at=int(np.argmax(missing))))
+                at = int(np.argmax(missing))
+                do = "leave out the rows without a sample first"
+                raise InputError(expected("a gyroscope without missing samples", "NaN", at=at, do=do))
             angle = np.vstack([np.zeros(3), np.cumsum(self.gyr[1:] * dt[:, None], axis=0)])
             new = np.column_stack([np.interp(t, self.time, angle[:, i]) for i in range(3)])
             fields["gyr"] = np.vstack([self.gyr[:1], np.diff(new, axis=0) * rate])
@@ -213,6 +252,10 @@ def _interpolate(t: FloatArray, time: FloatArray, value: FloatArray, period: flo
     for i in range(3):
         result[:, i] = np.interp(t, known, value[there, i], left=np.nan, right=np.nan)
     right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
-    gap = known[right] - known[right - 1]
-    result[gap > 2.0 * max(period, float(np.median(np.diff(known)))) * (1.0 + 1e-9)] = np.nan
+    left = right - 1
+    gap = known[right] - known[left]
+    wide = gap > 2.0 * max(period, float(np.median(np.diff(known)))) * (1.0 + 1e-9)
+    # at the edges of a gap there are samples
+    apart = np.minimum(np.abs(t - known[left]), np.abs(t - known[right])) > 1e-6 * period
+    result[wide & apart] = np.nan
     return result
