@@ -39,9 +39,14 @@ if TYPE_CHECKING:
     from northdown import datasets, estimators, evaluation, frames, io, plots, simulation
     from northdown.estimators.complementary import Complementary
     from northdown.estimators.cross_product import CrossProduct
+    from northdown.estimators.double_stage_ekf import DoubleStageEKF
+    from northdown.estimators.euler_ukf import EulerUKF
+    from northdown.estimators.gyro_euler_ekf import GyroEulerEKF
     from northdown.estimators.gyro_integration import GyroIntegration
     from northdown.estimators.madgwick import Madgwick
     from northdown.estimators.mahony import Mahony
+    from northdown.estimators.mekf import MEKF
+    from northdown.estimators.quaternion_ekf import QuaternionEKF
     from northdown.estimators.tilt_compass import TiltCompass
     from northdown.estimators.triad import Triad
     from northdown.evaluation import align, attitude_error
@@ -51,10 +56,14 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "MEKF",
     "Complementary",
     "CrossProduct",
+    "DoubleStageEKF",
+    "EulerUKF",
     "Flag",
     "FormatError",
+    "GyroEulerEKF",
     "GyroIntegration",
     "InputError",
     "Madgwick",
@@ -62,6 +71,7 @@ __all__ = [
     "MissingDependencyError",
     "NorthdownError",
     "Orientation",
+    "QuaternionEKF",
     "Recording",
     "TiltCompass",
     "Triad",
@@ -102,12 +112,12 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     if name[:1].isupper():
-        from northdown.estimators import registry
+        from northdown.estimators.base import find_class
 
-        for estimator in registry().values():
-            globals()[estimator.__name__] = estimator
-        if name in globals():
-            return globals()[name]
+        estimator = find_class(name)
+        if estimator is not None:
+            globals()[name] = estimator
+            return estimator
     raise AttributeError(f"module 'northdown' has no attribute {name!r}")
 
 

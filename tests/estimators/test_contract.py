@@ -6,7 +6,6 @@ import ast
 import dataclasses
 import inspect
 import re
-import typing
 
 import numpy as np
 import pytest
@@ -14,10 +13,9 @@ from scipy.spatial.transform import Rotation
 
 import northdown as nd
 from northdown import Flag, InputError, Recording
+from northdown.cli.parameters import describe
 from northdown.estimators import registry
-from northdown.simulation import Motion, SensorErrors, measure, random_motion, simulate
-
-EVERY = pytest.mark.parametrize("estimator", [e() for e in registry().values()], ids=list(registry()))
+from northdown.simulation import LOW_COST, measure, random_motion
 
 RATE = 4000.0  # Hz
 # rad. At this rate first-order integration, (ωΔt)³/12 a step, errs by under 1e-4 and Madgwick, which corrects by 2βΔt
@@ -31,22 +29,43 @@ def angle(a: Rotation, b: Rotation) -> float:
     return float((a * b.inv()).magnitude().max())
 
 
-@pytest.fixture(scope="module")
-def noisy() -> Recording:
-    """A low-cost sensor with its magnetometer at a fifth of the rate."""
-    recording = simulate(20.0, rate=100.0, seed=3)
-    slow = np.arange(len(recording)) % 5 != 0
-    return dataclasses.replace(recording, mag=np.where(slow[:, None], np.nan, recording.mag))
+@pytest.fixture(params=list(registry()))
+def estimator(request):
+    return registry()[request.param]()
 
 
 @pytest.fixture(scope="module")
-def exact() -> Recording:
-    """Error-free sensors on a body that turns without being shifted."""
-    motion = random_motion(10.0, RATE, np.random.default_rng(5), reach=0.0)
-    return measure(motion, SensorErrors(), np.random.default_rng(0))
+def recordings() -> dict[str, Recording]:
+    """Noisy: low-cost sensors, magnetometer at a fifth of the rate. Exact: no errors, turning without being shifted.
+
+    Gentle: the body stays away from pitch ±90°, for methods that fail there and say so.
+    """
+    made = {}
+    for kind, turn in (("wild", 1.0), ("gentle", 0.15)):
+        noisy = measure(random_motion(20.0, seed=3, turn=turn), LOW_COST, seed=3, rate=100.0)
+        slow = np.arange(len(noisy)) % 5 != 0
+        made["noisy", kind] = dataclasses.replace(noisy, mag=np.where(slow[:, None], np.nan, noisy.mag))
+        made["exact", kind] = measure(random_motion(10.0, seed=11, turn=turn, reach=0.0), rate=RATE)
+    pitch = {k: np.abs(r.reference.as_euler()[:, 1]).max() for k, r in made.items()}
+    assert pitch["exact", "wild"] > 1.0
+    assert max(pitch["exact", "gentle"], pitch["noisy", "gentle"]) < 1.0
+    return made
 
 
-@EVERY
+def kind(estimator) -> str:
+    return "gentle" if estimator.singular else "wild"
+
+
+@pytest.fixture
+def noisy(estimator, recordings) -> Recording:
+    return recordings["noisy", kind(estimator)]
+
+
+@pytest.fixture
+def exact(estimator, recordings) -> Recording:
+    return recordings["exact", kind(estimator)]
+
+
 def test_batch_is_stream(estimator, noisy):
     batch = estimator.run(noisy, frame="ENU")
     stream = estimator.stream(frame="ENU")
@@ -55,7 +74,6 @@ def test_batch_is_stream(estimator, noisy):
     assert np.abs(np.array(rows) - batch.quat).max() < SAME
 
 
-@EVERY
 def test_rate_is_as_good_as_times(estimator, noisy):
     batch = estimator.run(noisy)
     stream = estimator.stream(rate=100.0)
@@ -63,7 +81,6 @@ def test_rate_is_as_good_as_times(estimator, noisy):
     assert np.abs(last - batch.quat[-1]).max() < 1e-9  # adding up periods rounds otherwise than reading times
 
 
-@EVERY
 def test_split_run_is_whole_run(estimator, noisy):
     whole = estimator.run(noisy)
     stream = estimator.stream()
@@ -72,40 +89,37 @@ def test_split_run_is_whole_run(estimator, noisy):
     assert np.array_equal(np.concatenate([p.flags for p in parts]), whole.flags)
 
 
-@EVERY
 def test_mounting_turns_the_result(estimator, noisy):
     turn = Rotation.random(random_state=np.random.default_rng(7))
+    if estimator.singular:
+        turn = Rotation.from_euler("ZX", [2.0, 0.2])
     plain = estimator.run(noisy)
     turned = estimator.run(noisy.rotate_body(turn.as_matrix()))
-    # Rounding, amplified by the filter's own dynamics over 2000 steps
-    assert angle(turned.rotation * turn, plain.rotation) < 1e-8
+    # Rounding, amplified by the filter's own dynamics over 2000 steps; what works on angles is the same in other axes
+    # only as far as its errors are small
+    assert angle(turned.rotation * turn, plain.rotation) < (0.02 if estimator.singular else 1e-8)
 
 
-@EVERY
 @pytest.mark.parametrize("frame", ["ENU", "NWU"])
 def test_frame_turns_the_result(estimator, noisy, frame):
     assert angle(estimator.run(noisy, frame=frame).rotation, estimator.run(noisy).to_frame(frame).rotation) < 1e-10
     assert estimator.run(noisy, frame=frame).frame == frame
 
 
-@EVERY
 def test_truth_from_error_free_sensors(estimator, exact):
     assert angle(estimator.run(exact).rotation, exact.reference.rotation) < NEAR_TRUTH
 
 
-@EVERY
 def test_irregular_steps(estimator):
     rng = np.random.default_rng(11)
-    motion = random_motion(10.0, 2.0 * RATE, rng, reach=0.0)
+    motion = random_motion(10.0, seed=11, reach=0.0, turn=0.15 if estimator.singular else 1.0)
     keep = np.cumsum(rng.integers(1, 4, 45_000))
-    keep = keep[keep < len(motion.time)]
-    thinned = Motion(motion.time[keep], motion.rotation[keep], motion.acceleration[keep])
-    recording = measure(thinned, SensorErrors(), rng)
+    time = motion.times(2.0 * RATE)
+    recording = measure(motion, time=time[keep[keep < len(time)]])
     assert np.ptp(np.diff(recording.time)) > 0.9 / RATE
     assert angle(estimator.run(recording).rotation, recording.reference.rotation) < NEAR_TRUTH
 
 
-@EVERY
 def test_start_given(estimator, exact):
     blind = dataclasses.replace(exact, acc=np.full_like(exact.acc, np.nan), mag=np.full_like(exact.mag, np.nan))
     start = Rotation.from_euler("ZYX", [0.3, -0.2, 2.9])
@@ -115,7 +129,6 @@ def test_start_given(estimator, exact):
         assert not result.flags.any()
 
 
-@EVERY
 def test_rows_of_nan(estimator, exact):
     acc, mag = exact.acc.copy(), exact.mag.copy()
     acc[10_000:10_800] = np.nan
@@ -131,7 +144,6 @@ def test_rows_of_nan(estimator, exact):
         assert angle(result.rotation[there], exact.reference.rotation[there]) < NEAR_TRUTH
 
 
-@EVERY
 def test_late_sensors_are_flagged_and_then_used(estimator, exact):
     acc, mag = exact.acc.copy(), exact.mag.copy()
     tilt, heading = 2_000, 6_000
@@ -146,10 +158,9 @@ def test_late_sensors_are_flagged_and_then_used(estimator, exact):
         assert np.abs(level - exact.reference.rotation[tilt:heading].as_matrix()[:, 2]).max() < NEAR_TRUTH
 
 
-@EVERY
 def test_without_magnetometer_heading_is_flagged(estimator, exact):
     if "mag" in estimator.needs:
-        with pytest.raises(InputError, match="expected acc and mag for"):
+        with pytest.raises(InputError, match=f"for {estimator.name}, got no mag"):
             estimator.run(dataclasses.replace(exact, mag=None))
         return
     result = estimator.run(dataclasses.replace(exact, mag=None))
@@ -158,21 +169,18 @@ def test_without_magnetometer_heading_is_flagged(estimator, exact):
     assert np.abs(down - exact.reference.rotation.as_matrix()[:, 2]).max() < NEAR_TRUTH
 
 
-@EVERY
 def test_missing_sensor_is_named(estimator, exact):
     for sensor in estimator.needs:
         with pytest.raises(InputError, match=f"for {estimator.name}, got no {sensor}"):
             estimator.run(dataclasses.replace(exact, **{sensor: None}))
 
 
-@EVERY
 def test_one_sample_and_none(estimator, exact):
     one = estimator.run(exact[:1])
     assert angle(one.rotation, exact.reference.rotation[:1]) < SAME
     assert len(estimator.run(exact[:0])) == 0
 
 
-@EVERY
 @pytest.mark.parametrize("scale", [1e-6, 1e-2, 1e4])
 def test_size_of_the_field_does_not_matter(estimator, noisy, scale):
     plain = estimator.run(noisy)
@@ -180,7 +188,6 @@ def test_size_of_the_field_does_not_matter(estimator, noisy, scale):
     assert angle(scaled.rotation, plain.rotation) < 1e-8  # rounding, as for the mounting
 
 
-@EVERY
 def test_huge_rates_stay_on_the_sphere(estimator, exact):
     part = exact[:2000]
     for rate in (50.0, 2000.0, 1e6):
@@ -188,7 +195,6 @@ def test_huge_rates_stay_on_the_sphere(estimator, exact):
         assert np.abs(np.linalg.norm(result.quat, axis=1) - 1.0).max() < SAME
 
 
-@EVERY
 def test_unit_norm_after_ten_million_steps(estimator):
     n = 500_000
     rng = np.random.default_rng(13)
@@ -202,7 +208,6 @@ def test_unit_norm_after_ten_million_steps(estimator):
     assert np.abs(np.linalg.norm(result.quat, axis=1) - 1.0).max() < 1e-15
 
 
-@EVERY
 def test_gyroscope_held_through_short_gaps_only(estimator, exact):
     gyr = exact.gyr.copy()
     gyr[12_000:12_200] = np.nan
@@ -215,7 +220,6 @@ def test_gyroscope_held_through_short_gaps_only(estimator, exact):
             estimator.run(holed, max_gap=0.01001)
 
 
-@EVERY
 def test_time_must_not_run_backwards(estimator, noisy):
     time = noisy.time.copy()
     time[7] = time[6]
@@ -225,7 +229,6 @@ def test_time_must_not_run_backwards(estimator, noisy):
         estimator.run(dataclasses.replace(noisy, time=time))
 
 
-@EVERY
 def test_a_refused_update_changes_nothing(estimator, noisy):
     good, spoiled = estimator.stream(rate=100.0), estimator.stream(rate=100.0)
     for k in range(50):
@@ -246,7 +249,6 @@ def test_a_refused_update_changes_nothing(estimator, noisy):
         assert np.array_equal(a, b)
 
 
-@EVERY
 def test_update_takes_lists_and_other_types(estimator, noisy):
     plain, other = estimator.stream(rate=100.0), estimator.stream(rate=100.0)
     for k in range(3):
@@ -256,29 +258,24 @@ def test_update_takes_lists_and_other_types(estimator, noisy):
         assert np.array_equal(given, expected)
 
 
-@EVERY
 def test_parameters_are_described_and_checked(estimator):
     cls = type(estimator)
-    doc = inspect.getdoc(cls)
-    hints = typing.get_type_hints(cls)
+    described = describe(cls)
     for field in dataclasses.fields(cls):
-        block = re.search(rf"^{field.name}( : |, )[^\n]*\n((?:    .*\n|\n)+)", doc + "\n", re.M) or re.search(
-            rf"^[\w, ]*\b{field.name}\b[^\n]* : [^\n]*\n((?:    .*\n|\n)+)", doc + "\n", re.M
-        )
-        assert block, f"{cls.__name__}.{field.name} is not described"
-        if typing.get_origin(hints[field.name]) is typing.Literal:
+        parameter = described[field.name]
+        assert parameter.text, f"{cls.__name__}.{field.name} is not described"
+        if parameter.kind == "choice":
             with pytest.raises(InputError, match=f"{field.name} to be one of"):
                 cls(**{field.name: "nonsense"})
-        elif hints[field.name] is float:
-            assert re.search(r"[Rr]aising", block[0]), f"say what raising {field.name} does"
-            for bad in (float("nan"), float("inf"), "much", None):
+        elif parameter.kind == "number":
+            assert re.search(r"[Rr]aising", parameter.text), f"say what raising {field.name} does"
+            for bad in (float("nan"), float("inf"), "much"):
                 with pytest.raises(InputError, match=field.name):
                     cls(**{field.name: bad})
     with pytest.raises(TypeError, match="no_such_parameter"):
         cls(no_such_parameter=1.0)
 
 
-@EVERY
 def test_names_agree(estimator):
     cls = type(estimator)
     assert cls.__module__.rsplit(".", 1)[1] == estimator.name.replace("-", "_")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import difflib
 import importlib
 import math
 import pkgutil
@@ -22,17 +23,23 @@ import numpy.typing as npt
 
 from northdown._validation import FloatArray, as_float_array, check_choice, check_no_infinity, check_number
 from northdown.errors import InputError, expected
-from northdown.frames import Frame, check_frame, quat_from_ned
+from northdown.frames import Frame, check_frame, quat_from_ned, rotation_between
 from northdown.kernels.runner import (
+    COUNT,
     GYRO_GAP,
     HEADING_UNKNOWN,
     LAST,
     MAX_GAP,
     N_RUNNER,
+    NEXT,
+    NO_TIME,
+    NO_VECTOR,
     PENDING,
+    PERIOD,
     TILT_UNKNOWN,
     TIME_BACKWARDS,
     Kernel,
+    Workspace,
 )
 from northdown.orientation import Orientation
 from northdown.recording import Recording
@@ -40,6 +47,7 @@ from northdown.recording import Recording
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+_ORIENTATION_FIELDS = ("gyr_bias", "gyr_bias_sigma")
 _NO_SAMPLE: FloatArray = np.full(3, np.nan)
 
 
@@ -68,13 +76,18 @@ class Estimator(abc.ABC):
     """Sensors that the filter's steps use."""
     kernel: ClassVar[Kernel]
     outputs: ClassVar[Mapping[str, slice]] = types.MappingProxyType({})
-    """Where `gyr_bias` stands in what the kernel records, after the quaternion."""
+    """Where `gyr_bias`, its sigma and the `covariance` (six entries, NED) stand in what the kernel records; other
+    names, of one column each, become `Orientation.diagnostics`."""
+    singular: ClassVar[str] = ""
+    """Attitudes in which the method fails, in words; empty for none."""
 
     def __post_init__(self) -> None:
-        hints = typing.get_type_hints(type(self))
+        hints = _type_hints(type(self))
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
             hint = hints[f.name]
+            if value is None and types.NoneType in typing.get_args(hint):
+                continue
             if typing.get_origin(hint) is typing.Literal:
                 check_choice(f.name, value, typing.get_args(hint))
             elif hint is bool:
@@ -172,23 +185,39 @@ class Stream:
         self.frame: Frame = check_frame(frame)
         self.flags = 0
         kernel = estimator.kernel
-        self._params = np.array(estimator._parameters(self.frame), dtype=np.float64)
-        self._turn = quat_from_ned(self.frame)
-        self._period = math.nan if rate is None else 1.0 / check_number("rate", rate, above=0.0, unit="Hz")
-        self._count = 0
-        self._time = 0.0
-        start, pending = _start(self._turn, initial)
-        state = np.zeros(N_RUNNER + kernel.n_state)
+        work = kernel.workspace()
+        work.turn[:] = quat_from_ned(self.frame)
+        work.params[:] = estimator._parameters(self.frame)
+        start, pending = _start(work.turn, initial)
+        state = work.state
         state[PENDING] = pending
         state[LAST] = math.nan
         max_gap = check_number("max_gap", max_gap, low=0.0, unit="s")
         state[MAX_GAP] = max_gap if "gyr" in estimator.uses else math.inf
+        state[PERIOD] = math.nan if rate is None else 1.0 / check_number("rate", rate, above=0.0, unit="Hz")
         state[N_RUNNER : N_RUNNER + 4] = start
         state[N_RUNNER + 4 :] = estimator._initial_state(start, self.frame)
-        self._state = state
-        self._out = np.empty(kernel.n_out)
-        self._row = self._out[:4]
-        self._update = kernel.update
+        self._set_up(work)
+
+    def _set_up(self, work: Workspace) -> None:
+        self._work = work
+        self._whole = work.whole
+        self._row = work.out[:4]
+        self._update = self._first_update
+
+    def _first_update(self, *args: Any) -> int:
+        """Compile `update`, which a whole recording does not need, when it is first called."""
+        self._update = self.estimator.kernel.update
+        return self._update(*args)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"estimator": self.estimator, "frame": self.frame, "flags": self.flags, "whole": self._whole}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.estimator, self.frame, self.flags = state["estimator"], state["frame"], state["flags"]
+        work = self.estimator.kernel.workspace()
+        work.whole[:] = state["whole"]
+        self._set_up(work)
 
     def update(
         self,
@@ -221,26 +250,32 @@ class Stream:
         Fastest with contiguous float64 arrays; anything else is converted first.
         """
         if time is None:
-            time = self._time + self._period
-            if time != time:
-                raise InputError(expected("a rate, or a time with each sample", "neither", do="give stream(rate=…)"))
+            time = NEXT
         if acc is None:
             acc = _NO_SAMPLE
         if mag is None:
             mag = _NO_SAMPLE
         try:
-            code = self._update(self._params, self._state, self._turn, time, gyr, acc, mag, self._out)
+            code = self._update(self._whole, time, gyr, acc, mag)
         except TypeError:
-            gyr, acc, mag = _vector("gyr", gyr), _vector("acc", acc), _vector("mag", mag)
-            code = self._update(self._params, self._state, self._turn, float(time), gyr, acc, mag, self._out)
+            code = -1 - NO_VECTOR
         if code < 0:
-            for name, value in (("gyr", gyr), ("acc", acc), ("mag", mag)):
-                check_no_infinity(name, _vector(name, value), at=self._count)
-            self._raise(-1 - code, time, self._count)
+            code = self._update_converted(code, gyr, acc, mag, time)
         self.flags = code
-        self._time = time
-        self._count += 1
         return self._row.copy()
+
+    def _update_converted(self, code: int, gyr: Any, acc: Any, mag: Any, time: Any) -> int:
+        """Try again with converted arguments if that was the trouble, else say what was wrong."""
+        count = int(self._work.state[COUNT])
+        samples = {"gyr": _vector("gyr", gyr), "acc": _vector("acc", acc), "mag": _vector("mag", mag)}
+        if code == -1 - NO_VECTOR:
+            time = check_number("time", time)
+            code = self._update(self._whole, time, *samples.values())
+        if code < 0:
+            for name, sample in samples.items():
+                check_no_infinity(name, sample, at=count)
+            self._raise(-1 - code, time, count)
+        return code
 
     def run(self, recording: Recording) -> Orientation:
         """Go on through a recording, or a part of one, from where this stream stands.
@@ -262,23 +297,24 @@ class Stream:
             sensors = [nothing if s is None else s for s in sensors]
         out = np.empty((n, kernel.n_out))
         flags = np.zeros(n, np.uint8)
-        code, done = kernel.run(self._params, self._state, self._turn, recording.time, *sensors, out, flags)
+        work = self._work
+        code, done = kernel.run(work.params, work.state, work.turn, recording.time, *sensors, out, flags)
         if code:
             self._raise(code, recording.time[done] if done < n else math.nan, done)
         if n:
-            self._time = float(recording.time[-1])
             self.flags = int(flags[-1])
-        self._count += n
         return Orientation._trusted(
             time=recording.time,
             quat=out[:, :4],
             frame=self.frame,
             flags=flags,
             name=estimator.name,
-            **{key: out[:, where] for key, where in estimator.outputs.items()},
+            **_outputs(estimator.outputs, out, self.frame),
         )
 
     def _raise(self, code: int, time: float, at: int) -> typing.NoReturn:
+        if code == NO_TIME:
+            raise InputError(expected("a rate, or a time with each sample", "neither", do="give stream(rate=…)"))
         if code == TIME_BACKWARDS:
             raise InputError(
                 expected(
@@ -289,7 +325,7 @@ class Stream:
                 )
             )
         if code == GYRO_GAP:
-            limit = self._state[MAX_GAP]
+            limit = self._work.state[MAX_GAP]
             raise InputError(
                 expected(
                     f"a gyroscope sample at least every {limit:g} s",
@@ -308,13 +344,38 @@ class Stream:
         )
 
 
+def _outputs(where: Mapping[str, slice], out: FloatArray, frame: Frame) -> dict[str, Any]:
+    """Fields of the `Orientation` from what the kernel recorded after the quaternion."""
+    fields: dict[str, Any] = {}
+    for key, columns in where.items():
+        values = out[:, columns]
+        if key == "covariance":
+            fields[key] = _covariance(values, frame)
+        elif key in _ORIENTATION_FIELDS:
+            fields[key] = values
+        else:
+            fields.setdefault("diagnostics", {})[key] = values[:, 0]
+    return fields
+
+
+def _covariance(upper: FloatArray, frame: Frame) -> FloatArray:
+    """Matrices (N, 3, 3) in `frame` from upper triangles (N, 6) by rows in NED; frames differ by whole axes."""
+    entry = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+    mat = rotation_between("NED", frame).as_matrix().round()
+    axis, sign = np.abs(mat).argmax(axis=1), mat.sum(axis=1)
+    result = np.empty((len(upper), 3, 3))
+    for i, j in np.ndindex(3, 3):
+        np.multiply(upper[:, entry[axis[i], axis[j]]], sign[i] * sign[j], out=result[:, i, j])
+    return result
+
+
 def _start(turn: FloatArray, initial: Rotation | None) -> tuple[FloatArray, int]:
     """Quaternion body → NED at the start, and what is still to be found."""
+    if initial is None:
+        return turn * (1.0, -1.0, -1.0, -1.0), TILT_UNKNOWN | HEADING_UNKNOWN
     from scipy.spatial.transform import Rotation
 
     to_ned = Rotation.from_quat(np.roll(turn, -1)).inv()
-    if initial is None:
-        return np.roll(to_ned.as_quat(), 1), TILT_UNKNOWN | HEADING_UNKNOWN
     if not isinstance(initial, Rotation) or not initial.single:
         raise InputError(expected("initial as a single SciPy Rotation, body → frame", type(initial).__name__))
     return np.roll((to_ned * initial).as_quat(), 1), 0
@@ -324,31 +385,54 @@ def _vector(name: str, value: npt.ArrayLike) -> FloatArray:
     array = as_float_array(name, value)
     if array.shape != (3,):
         raise InputError(expected(f"{name} of shape (3,)", f"shape {array.shape}"))
-    return array
+    vector = np.empty(3)  # aligned, writable, of NumPy's own float64
+    vector[:] = array
+    return vector
 
 
 @cache
+def _type_hints(cls: type[Estimator]) -> Mapping[str, Any]:
+    return typing.get_type_hints(cls)
+
+
+@cache
+def _modules() -> tuple[str, ...]:
+    """Names of the files that hold estimators."""
+    package = importlib.import_module("northdown.estimators")
+    names = (m.name for m in pkgutil.iter_modules(package.__path__))
+    return tuple(sorted(n for n in names if not n.startswith("_") and n != "base"))
+
+
+@cache
+def _load(module_name: str) -> type[Estimator]:
+    """The estimator of one file."""
+    module = importlib.import_module(f"northdown.estimators.{module_name}")
+    for value in vars(module).values():
+        if isinstance(value, type) and issubclass(value, Estimator) and value.__module__ == module.__name__:
+            return value
+    raise TypeError(f"estimators/{module_name}.py defines no Estimator")
+
+
 def registry() -> Mapping[str, type[Estimator]]:
     """All estimators by name, in the order of their names."""
-    package = importlib.import_module("northdown.estimators")
-    found: dict[str, type[Estimator]] = {}
-    for module_info in pkgutil.iter_modules(package.__path__):
-        if module_info.name.startswith("_") or module_info.name == "base":
-            continue
-        module = importlib.import_module(f"northdown.estimators.{module_info.name}")
-        for value in vars(module).values():
-            if isinstance(value, type) and issubclass(value, Estimator) and value.__module__ == module.__name__:
-                found[value.name] = value
-    return types.MappingProxyType(dict(sorted(found.items())))
+    found = [_load(module_name) for module_name in _modules()]
+    return {estimator.name: estimator for estimator in sorted(found, key=lambda e: e.name)}
 
 
 def get(name: str) -> type[Estimator]:
-    """Estimator class by its name, such as ``"mahony"``."""
-    known = registry()
-    if name not in known:
-        import difflib
+    """Estimator class by its name, such as ``"mahony"``; only its own file is loaded."""
+    module_name = name.replace("-", "_")
+    if module_name in _modules() and "_" not in name:
+        return _load(module_name)
+    known = [m.replace("_", "-") for m in _modules()]
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else None
+    raise InputError(expected(f"an estimator out of {', '.join(known)}", repr(name), do=hint))
 
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else None
-        raise InputError(expected(f"an estimator out of {', '.join(known)}", repr(name), do=hint))
-    return known[name]
+
+def find_class(class_name: str) -> type[Estimator] | None:
+    """Estimator by the name of its class, such as ``"GyroEulerEKF"``, whose file is ``gyro_euler_ekf``."""
+    for module_name in _modules():
+        if module_name.replace("_", "") == class_name.lower():
+            return _load(module_name)
+    return None

@@ -50,11 +50,12 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         e = gravity_error(q, acc)
     if is_sample(mag):
         e = add(e, field_error(q, mag))
+    # ω − b⁺ + kp e with the new bias b⁺ = b − k e, without waiting for b⁺
     k = ki * dt
+    rate = (gyr[0] - bx + (kp + k) * e[0], gyr[1] - by + (kp + k) * e[1], gyr[2] - bz + (kp + k) * e[2])
     bx -= k * e[0]
     by -= k * e[1]
     bz -= k * e[2]
-    rate = (gyr[0] - bx + kp * e[0], gyr[1] - by + kp * e[1], gyr[2] - bz + kp * e[2])
     w, x, y, z = strapdown.step(integrator, q, rate, dt)
     return (w, x, y, z, bx, by, bz)
 

@@ -24,7 +24,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +37,9 @@ Indices = npt.NDArray[np.int64]
 # of the inverse square.
 _EXACT = 48
 _POINTS = 15
+
+PRODUCTS: Array = np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0]).ravel()
+"""Products of the weights of two second differences."""
 
 
 def _sums(values: Array, starts: Indices, stops: Indices, sizes: Indices, total: Array, count: Indices) -> None:
@@ -84,48 +86,23 @@ def _sums(values: Array, starts: Indices, stops: Indices, sizes: Indices, total:
 
 
 @inline
-def _smooth(t: float, m: float, n: float, c: Array) -> float:
-    """Cov(D_m(i), D_n(i + t)) without the part of quantisation."""
-    total = 0.0
-    for a in range(3):
-        for b in range(3):
-            weight = (1.0 if a != 1 else -2.0) * (1.0 if b != 1 else -2.0)
-            s = math.fabs(t + b * n - a * m)
-            value = s * (s * s * (c[3] / 12.0) - 0.5 * c[1])
-            if s > 0.0:
-                value += c[2] / (2.0 * math.pi) * s * s * math.log(s)
-            total += weight * value
-    return total
-
-
-@inline
-def _spike(t: float, m: float, n: float, c: Array) -> float:
-    """Cov(D_m(i), D_n(i + t)) of quantisation alone: zero except at nine lags."""
-    total = 0.0
-    for a in range(3):
-        for b in range(3):
-            if t + b * n - a * m == 0.0:
-                total += (1.0 if a != 1 else -2.0) * (1.0 if b != 1 else -2.0)
-    return c[0] * total
-
-
-@inline
-def _breakpoints(m: float, n: float, low: float, high: float, turn: float, points: Array) -> None:
+def _breakpoints(m: float, n: float, low: float, high: float, turn: float, shift: Array, points: Array) -> None:
     """Lags between which covariance times number of pairs is smooth, in order, cut to [low, high].
 
     `turn`: lag at which the number of pairs (i, j) of one lag changes its slope, besides zero.
     """
-    for a in range(3):
-        for b in range(3):
-            points[3 * a + b] = a * m - b * n
     # only flicker reaches beyond the overlap of both differences, and falls with the square of the lag
     reach = m + n
     points[9], points[10] = -2.0 * n - reach, 2.0 * m + reach
     points[11], points[12] = -2.0 * n - 6.0 * reach, 2.0 * m + 6.0 * reach
     points[13], points[14] = 0.0, turn
     for i in range(_POINTS):
+        value = -shift[i] if i < 9 else points[i]
+        if value < low:
+            value = low
+        if value > high:
+            value = high
         # sorted by insertion: numba's own sort takes seconds to compile
-        value = min(max(points[i], low), high)
         j = i
         while j > 0 and points[j - 1] > value:
             points[j] = points[j - 1]
@@ -152,12 +129,26 @@ def _lags(points: Array, rule: Array, lags: Array, weights: Array) -> int:
     return count
 
 
+@inline
+def _difference_covariance(t: float, shift: Array, weight: Array, c: Array) -> tuple[float, float]:
+    """Cov(D_m(i), D_n(i + t)): its smooth part, and quantisation, which is zero except at nine lags."""
+    smooth, spike = 0.0, 0.0
+    for k in range(9):
+        s = math.fabs(t + shift[k])
+        if s > 0.0:
+            flicker = c[2] / (2.0 * math.pi) * math.log(s)
+            smooth += weight[k] * s * (s * (flicker + s * (c[3] / 12.0)) - 0.5 * c[1])
+        else:
+            spike += weight[k] * c[0]
+    return smooth, spike
+
+
 def _covariance(
-    sizes: Array, lengths: Array, counts: Array, c: Array, rule: Array, out: Array
+    sizes: Array, lengths: Array, counts: Array, c: Array, rule: Array, weight: Array, out: Array
 ) -> None:
     """Covariance of the estimates; see `covariance`."""
-    points = np.empty(_POINTS)
-    room = _POINTS * max(_EXACT, len(rule)) + _POINTS
+    shift, points = np.empty(9), np.empty(_POINTS)
+    room = _POINTS * (_EXACT + len(rule)) + _POINTS
     lags, weights = np.empty(room), np.empty(room)
     for index in range(len(sizes) * len(sizes) * len(lengths)):
         j = index // len(lengths) % len(sizes)
@@ -166,23 +157,28 @@ def _covariance(
         terms_m, terms_n = length - 2.0 * m + 1.0, length - 2.0 * n + 1.0
         if j > i or terms_m <= 0.0 or terms_n <= 0.0:
             continue
-        _breakpoints(m, n, 1.0 - terms_m, terms_n - 1.0, terms_n - terms_m, points)
+        for k in range(9):
+            shift[k] = (k % 3) * n - (k // 3) * m
+        _breakpoints(m, n, 1.0 - terms_m, terms_n - 1.0, terms_n - terms_m, shift, points)
         number = _lags(points, rule, lags, weights)
         # quantisation's spikes, which stand at breakpoints, come after the smooth part
-        lags[number : number + _POINTS] = points
+        for k in range(_POINTS):
+            lags[number + k] = points[k]
         cross = 4.0 * c[4] * m * m * n * n
         total = 0.0
         for k in range(number + _POINTS):
             t = lags[k]
             if k > number and t == lags[k - 1]:
                 continue
-            pairs = min(terms_m, terms_n - t) - max(0.0, -t)
-            value = _smooth(t, m, n, c)
+            # i runs over terms_m places and j = i + t over terms_n; as n ≤ m, fewer of m
+            pairs = terms_m if t <= terms_n - terms_m else terms_n - t
+            if t < 0.0:
+                pairs += t
+            smooth, spike = _difference_covariance(t, shift, weight, c)
             if k < number:
-                total += weights[k] * pairs * value * (2.0 * value + cross)
+                total += weights[k] * pairs * smooth * (2.0 * smooth + cross)
             else:
-                spike = _spike(t, m, n, c)
-                total += pairs * spike * (4.0 * value + 2.0 * spike + cross)
+                total += pairs * spike * (4.0 * smooth + 2.0 * spike + cross)
         out[i, j] += total / (4.0 * (m * n) ** 2 * counts[i] * counts[j])
         out[j, i] = out[i, j]
 
@@ -195,11 +191,11 @@ def sums() -> Callable[..., None]:
 
 @cache
 def covariance() -> Callable[..., None]:
-    """Compiled ``covariance(sizes, lengths, counts, c, rule, out)``.
+    """Compiled ``covariance(sizes, lengths, counts, c, rule, weight, out)``.
 
     Adds to `out` the covariance (T, T) of the estimates at the cluster sizes (T,) from runs of those lengths, with
     counts (T,) second differences in all, for the noise c = (q, n, b, k, r) of the module's docstring. `rule` holds
-    nodes and weights (P, 2) of a Gauss–Legendre rule on [−1, 1].
+    nodes and weights (P, 2) of a Gauss–Legendre rule on [−1, 1], `weight` is `PRODUCTS`.
     """
-    signature = "(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
+    signature = "(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1])"
     return compiled(_covariance, "allan-covariance", signature)

@@ -10,12 +10,18 @@ from northdown.kernels.quaternion import Quaternion, Vector
 
 @inline
 def to_zyx(q: Quaternion) -> Vector:
-    """Roll, pitch, yaw (rad) of the unit quaternion q (K06 (2.15)); pitch from both legs, precise near ±90°."""
+    """Roll, pitch, yaw (rad) of the unit quaternion q (K06 (2.15)); pitch from both legs, precise near ±90°.
+
+    At pitch ±90° only yaw ∓ roll is defined, and roll is set to 0.
+    """
     w, x, y, z = q
     r00, r10 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
     r20 = 2.0 * (x * z - w * y)
+    cos_pitch = math.sqrt(r00 * r00 + r10 * r10)
+    pitch = math.atan2(-r20, cos_pitch)
+    if cos_pitch < 1e-9:
+        return (0.0, pitch, math.atan2(-2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z)))
     roll = math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
-    pitch = math.atan2(-r20, math.sqrt(r00 * r00 + r10 * r10))
     return (roll, pitch, math.atan2(r10, r00))
 
 

@@ -19,6 +19,9 @@ import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
 
+# Some of the options used here are missing in its annotations.
+_njit: Any = numba.njit
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Contraction to fused multiply-add and ignoring the sign of zero are safe here; the rest of fastmath may
@@ -37,14 +40,19 @@ class _Inlined:
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._inlined = numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_FLAGS)(
-            function
-        )
-        self._numba_type_ = self._inlined._numba_type_
+
+    @functools.cached_property
+    def _inlined(self) -> Any:
+        # Made when first needed: where all kernels come from the disk, that is never.
+        return _njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_FLAGS)(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._inlined._numba_type_
 
     @functools.cached_property
     def _from_python(self) -> Callable[..., Any]:
-        return numba.njit(**_FLAGS)(self.py_func)  # type: ignore[no-any-return]
+        return _njit(**_FLAGS)(self.py_func)  # type: ignore[no-any-return]
 
     def __call__(self, *args: Any) -> Any:
         return self._from_python(*args)
@@ -113,7 +121,7 @@ def _warn_not_kept(problem: Exception) -> None:
     warnings.warn(f"compiled kernels are not kept between runs: {problem}", RuntimeWarning, stacklevel=3)
 
 
-def compiled(function: Callable[..., Any], name: str, signature: str) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], name: str, signature: Any) -> Callable[..., Any]:
     """Compile a function for one signature and keep the machine code on disk under `name`.
 
     Arguments of other types raise TypeError instead of being compiled for. Where numba finds no writable folder
@@ -121,7 +129,7 @@ def compiled(function: Callable[..., Any], name: str, signature: str) -> Callabl
     """
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return function
-    dispatcher = numba.njit(**_FLAGS)(function)
+    dispatcher = _njit(**_FLAGS)(function)
     try:
         dispatcher._cache = _KernelCache(function, name)
     except (RuntimeError, OSError, AttributeError) as problem:

@@ -14,13 +14,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+import numba
 import numpy as np
 import numpy.typing as npt
 from numba.np.unsafe.ndarray import to_fixed_tuple as _to_fixed_tuple
 
 from northdown.kernels.jit import compiled, inline
+from northdown.kernels.numpy_abi import IN_PLACE, THROUGH_NUMBA, Reading, layout_holds
 from northdown.kernels.quaternion import dot, down_b, multiply
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 
@@ -30,7 +32,12 @@ HELD: Final = 1  # last rate of the gyroscope, three entries
 GAP: Final = 4  # time (s) since the last gyroscope sample
 LAST: Final = 5  # time (s) of the last sample; NaN before the first
 MAX_GAP: Final = 6  # longest time (s) for which a rate is held
-N_RUNNER: Final = 7
+PERIOD: Final = 7  # time (s) from one live sample to the next where none is given; NaN when not known
+COUNT: Final = 8  # samples done
+N_RUNNER: Final = 9
+
+# Stands for the time of a live sample that has none of its own: a number that no clock gives.
+NEXT: Final = -1.7e308
 
 # Bits of the flags written for every sample; `northdown.orientation.Flag` gives them their public names.
 TILT_UNKNOWN: Final = 1
@@ -43,7 +50,8 @@ OK: Final = 0
 TIME_BACKWARDS: Final = 1
 GYRO_GAP: Final = 2
 NOT_FINITE: Final = 3
-WRONG_SHAPE: Final = 4
+NO_VECTOR: Final = 4
+NO_TIME: Final = 5
 
 _NAN: Final = math.nan
 
@@ -70,6 +78,13 @@ def same_state(p: tuple[float, ...], s: Any) -> Any:
 def no_flags(p: tuple[float, ...], s: Any) -> int:
     """Flags of a filter that has none (the default of `Kernel.flagged`)."""
     return 0
+
+
+@inline
+def is_attitude(w: float, x: float, y: float, z: float) -> bool:
+    """Whether a quaternion is one of an attitude: numbers, and not all zero, as an overflow can leave them."""
+    square: float = w * w + x * x + y * y + z * z
+    return 0.25 < square < math.inf
 
 
 @inline
@@ -188,10 +203,10 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
                     out[i, j] = o[j]
             for j in range(4, n_out):
                 out[i, j] = o[j]
-        if code == OK and len(time) > 0 and s[0] != s[0]:
+        if code == OK and len(time) > 0 and not is_attitude(s[0], s[1], s[2], s[3]):
             code = NOT_FINITE
             for i in range(len(time)):
-                if out[i, 0] != out[i, 0]:
+                if not is_attitude(out[i, 0], out[i, 1], out[i, 2], out[i, 3]):
                     done = i
                     break
         for j in range(n_state):
@@ -199,36 +214,51 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
         for j in range(5):
             state[j] = r[j]
         state[LAST] = last
+        state[COUNT] += done
         return code, done
 
     return run
 
 
-def _make_update(kernel: Kernel) -> Callable[..., Any]:
+def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
     tick = _make_tick(kernel)
     output = kernel.output
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+    is_vector, vector, doubles = reading.is_vector, reading.vector, reading.doubles
+    first_state = _N_TURN + n_params
+    first_out = first_state + N_RUNNER + n_state
+    n_work = first_out + n_out
 
-    def update(
-        params: Array, state: Array, turn: Array, time: float, gyr: Array, acc: Array, mag: Array, out: Array
-    ) -> Any:
-        if gyr.size != 3 or acc.size != 3 or mag.size != 3:
-            return -1 - WRONG_SHAPE
+    def update(whole: Any, time: float, gyr: Any, acc: Any, mag: Any) -> Any:
+        if not (is_vector(whole, gyr) and is_vector(whole, acc) and is_vector(whole, mag)):
+            return -1 - NO_VECTOR
+        rate, force, field = vector(gyr), vector(acc), vector(mag)
+        for component in rate + force + field:
+            if math.isinf(component):
+                return -1 - NOT_FINITE
+        work = doubles(whole, n_work)
+        turn = work[:_N_TURN]
+        state = work[first_state:]
+        out = work[first_out:]
         last = state[LAST]
-        dt = time - last if last == last else 0.0
-        if not dt >= 0.0 or time - time != 0.0:
-            return -1 - TIME_BACKWARDS
-        p = to_fixed_tuple(params, n_params)
+        if time == NEXT:
+            if state[PERIOD] != state[PERIOD]:
+                return -1 - NO_TIME
+            dt = state[PERIOD] if last == last else 0.0
+            time = last + dt if last == last else 0.0
+        else:
+            dt = time - last if last == last else 0.0
+            if not dt >= 0.0 or time - time != 0.0:
+                return -1 - TIME_BACKWARDS
+        p = to_fixed_tuple(work[_N_TURN:], n_params)
         s = to_fixed_tuple(state[N_RUNNER:], n_state)
         r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
-        code, flag, s, r = tick(
-            p, s, r, dt, (gyr[0], gyr[1], gyr[2]), (acc[0], acc[1], acc[2]), (mag[0], mag[1], mag[2])
-        )
+        code, flag, s, r = tick(p, s, r, dt, rate, force, field)
         if code != OK:
             return -1 - code
         o = output(p, s)
         q = (o[0], o[1], o[2], o[3])
-        if q[0] - q[0] != 0.0:
+        if not is_attitude(q[0], q[1], q[2], q[3]):
             return -1 - NOT_FINITE
         if turn[0] != 1.0:
             q = multiply((turn[0], turn[1], turn[2], turn[3]), q)
@@ -241,13 +271,35 @@ def _make_update(kernel: Kernel) -> Callable[..., Any]:
         for j in range(5):
             state[j] = r[j]
         state[LAST] = time
+        state[COUNT] += 1.0
         return int(flag)
 
     return update
 
 
-_RUN_SIGNATURE: Final = "(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], u1[::1])"
-_UPDATE_SIGNATURE: Final = "(f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1])"
+_N_TURN: Final = 4
+_VECTOR: Any = numba.float64[::1]
+# A recording's arrays may be read-only.
+_TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)
+_ROWS: Any = numba.types.Array(numba.float64, 2, "C", readonly=True)
+_RUN_SIGNATURE: Final = (
+    *(_VECTOR, _VECTOR, _VECTOR),
+    *(_TIMES, _ROWS, _ROWS, _ROWS),
+    *(numba.float64[:, ::1], numba.uint8[::1]),
+)
+
+
+class Workspace(NamedTuple):
+    """What a running estimate keeps, in one array, as a call with one array is quicker than with four."""
+
+    whole: Array
+    turn: Array
+    """Quaternion from NED to the frame of the result."""
+    params: Array
+    state: Array
+    """The runner's entries, then the filter's."""
+    out: Array
+    """What was recorded of the last live sample; the first four entries are its attitude."""
 
 
 @dataclass(frozen=True)
@@ -278,9 +330,9 @@ class Kernel:
     Notes
     -----
     ``run(params, state, turn, time, gyr, acc, mag, out, flags)`` works through arrays and returns a code and the
-    number of samples done. ``update(params, state, turn, time, gyr, acc, mag, out)`` takes one sample, returns its
-    flags or −1 − code, and on failure leaves the state as it was. `turn` is the quaternion from NED to
-    the frame of the result.
+    number of samples done. ``update(whole, time, gyr, acc, mag)`` takes one sample, returns its flags or −1 − code,
+    and on failure leaves the state as it was. The arrays are those of `workspace`. `update` takes anything for a
+    sample: what is not an array of three float64 gives −1 − NO_VECTOR (or TypeError).
     """
 
     name: str
@@ -293,12 +345,27 @@ class Kernel:
     flagged: Callable[..., int] = no_flags
     memoryless: bool = False
 
+    def workspace(self) -> Workspace:
+        """New arrays for one running estimate, all zero."""
+        ends = np.cumsum((_N_TURN, self.n_params, N_RUNNER + self.n_state, self.n_out))
+        whole = np.zeros(ends[-1])
+        return Workspace(whole, *np.split(whole, ends[:-1]))
+
     @cached_property
     def run(self) -> Callable[..., tuple[int, int]]:
         """The compiled loop over arrays."""
         return compiled(_make_run(self), f"{self.name}-run", _RUN_SIGNATURE)
 
     @cached_property
+    def _update(self) -> Any:
+        reading = IN_PLACE if layout_holds() else THROUGH_NUMBA
+        signature = (reading.kind, numba.float64, reading.kind, reading.kind, reading.kind)
+        return compiled(_make_update(self, reading), f"{self.name}-update", signature)
+
+    @cached_property
     def update(self) -> Callable[..., int]:
         """The compiled work for one live sample."""
-        return compiled(_make_update(self), f"{self.name}-update", _UPDATE_SIGNATURE)
+        if not layout_holds():
+            return self._update  # type: ignore[no-any-return]
+        (code,) = self._update.overloads.values()
+        return code.entry_point  # type: ignore[no-any-return]

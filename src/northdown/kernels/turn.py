@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +36,9 @@ def columns(q: Quaternion) -> tuple[Vector, Vector, Vector]:
     )
 
 
-def _turns(rate: Array, dt: Array, bias: Array, mat: Array, starts: Indices, stops: Indices, r: Array, k: Array) -> None:
+def _turns(
+    rate: Array, dt: Array, bias: Array, mat: Array, starts: Indices, stops: Indices, r: Array, k: Array
+) -> None:
     """Integrate each stretch [start, stop) of the samples; `r` (T, 3, 3) and `k` (T, 3, 3, 3) are written."""
     for turn in range(len(starts)):
         q = (1.0, 0.0, 0.0, 0.0)
@@ -76,7 +77,5 @@ def turns() -> Callable[..., None]:
     `rate` (N, 3) and `dt` (N,) are all samples, `bias` (T, 3) that of each stretch, `mat` (3, 3) is M, `starts` and
     `stops` (T,) delimit the stretches.
     """
-    signature = (
-        "(f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1], i8[::1], f8[:,:,::1], f8[:,:,:,::1])"
-    )
+    signature = "(f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1], i8[::1], f8[:,:,::1], f8[:,:,:,::1])"
     return compiled(_turns, "gravity-turns", signature)

@@ -1,132 +1,176 @@
-"""A simulated recording: what the sensors of a moving body say, with known truth."""
+"""`measure`: what the sensors on a moving body say, with the truth beside it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from northdown._validation import FloatArray, check_number
 from northdown.errors import InputError, expected
 from northdown.frames import check_frame
 from northdown.orientation import Orientation
 from northdown.recording import Recording
-from northdown.simulation.motion import Motion, random_motion
-
-STANDARD_GRAVITY = 9.80665
-
-
-@dataclass(frozen=True)
-class SensorErrors:
-    """Errors of a nine-axis sensor: white noise and a constant bias of each kind.
-
-    Parameters
-    ----------
-    gyr_noise, acc_noise, mag_noise : float
-        Noise densities, rad/s/√Hz, m/s²/√Hz and µT/√Hz.
-    gyr_bias, acc_bias, mag_bias : float
-        Standard deviations of the constant bias of each axis, rad/s, m/s², µT.
-    """
-
-    gyr_noise: float = 0.0
-    acc_noise: float = 0.0
-    mag_noise: float = 0.0
-    gyr_bias: float = 0.0
-    acc_bias: float = 0.0
-    mag_bias: float = 0.0
-
-
-LOW_COST = SensorErrors(gyr_noise=1.75e-4, acc_noise=3e-3, mag_noise=0.06, gyr_bias=5e-3, acc_bias=0.03, mag_bias=0.5)
-"""Errors of a common MEMS part after calibration: 0.01 °/s/√Hz, 300 µg/√Hz, 0.6 µT at 100 Hz; bias 0.3 °/s."""
+from northdown.simulation import _quaternions as quaternions
+from northdown.simulation.dipole import Dipole
+from northdown.simulation.imu_bench import Bench
+from northdown.simulation.imu_errors import SensorErrors
+from northdown.simulation.motion import STANDARD_GRAVITY, Motion, vector
+from northdown.simulation.seeds import Seed, check_seed
 
 
 def measure(
     motion: Motion,
-    errors: SensorErrors,
-    rng: np.random.Generator,
+    errors: SensorErrors | None = None,
+    seed: Seed = 0,
     *,
-    field: FloatArray | None = None,
+    rate: float = 100.0,
+    time: npt.ArrayLike | None = None,
+    field: npt.ArrayLike | None = None,
     gravity: float = STANDARD_GRAVITY,
+    position: npt.ArrayLike = (0.0, 0.0, 0.0),
+    disturbances: Sequence[Dipole] = (),
     frame: str = "NED",
-    name: str = "simulated",
+    name: str | None = None,
 ) -> Recording:
-    """Let a nine-axis sensor measure a motion.
+    """Let sensors measure a motion.
 
     Parameters
     ----------
     motion : Motion
         What the body does.
-    errors : SensorErrors
-        Errors to add.
-    rng : numpy.random.Generator
-        Source of the randomness.
+    errors : SensorErrors, optional
+        Which sensors there are and what they add to the truth; all three, without errors, when not given.
+    seed : int or numpy.random.Generator
+        The same seed gives the same recording, byte by byte. Each source of error has a stream of its own, so that a
+        changed parameter leaves the other errors as they are.
+    rate : float
+        Sampling rate, Hz.
+    time : (N,) array, optional
+        Sampling times instead of a rate, increasing, within the motion's span, s.
     field : (3,) array, optional
-        Magnetic field in NED, µT; 50 µT with 65° dip when not given.
+        Magnetic field in NED, µT; 50 µT with 65° dip when not given. See `northdown.fields`.
     gravity : float
         Gravity, m/s².
+    position : (3,) array
+        Place of the sensors in the body, m: the accelerometer feels the turning of its lever arm.
+    disturbances : sequence of Dipole
+        Magnets in the surroundings.
     frame : {"NED", "ENU", "NWU"}
         Frame in which the recording states its truth.
-    name : str
-        Name of the recording.
+    name : str, optional
+        Name of the recording; the motion's when not given.
 
     Returns
     -------
     Recording
-        The gyroscope's sample is the mean rate since the sample before: log(R_{k−1}ᵀ R_k)/Δt, so that the exact
-        integration of error-free samples gives back the truth.
+        Its `reference` is the truth at its time stamps, with the gyroscope's true bias. `movement` marks samples with
+        rotation, velocity or acceleration; it is None where there are none.
+
+    Notes
+    -----
+    A sample of the gyroscope is the mean rate since the sample before, log(R_{k−1}ᵀ R_k)/Δt, so that the exact
+    integration of error-free samples gives back the truth.
     """
-    rotation, n = motion.rotation, len(motion.time)
-    if n < 2:
-        raise InputError(expected("a motion of two samples or more", f"{n}"))
-    if field is None:
-        field = 50.0 * np.array([np.cos(np.deg2rad(65.0)), 0.0, np.sin(np.deg2rad(65.0))])
-    dt = np.diff(motion.time)
-    step = (rotation[:-1].inv() * rotation[1:]).as_rotvec() / dt[:, None]
-    gyr = np.vstack([step[:1], step])
-    acc = rotation.inv().apply(motion.acceleration - np.array([0.0, 0.0, gravity]))
-    mag = rotation.inv().apply(field)
-    root_rate = np.sqrt(1.0 / np.median(dt))
-
-    def spoil(true: FloatArray, noise: float, bias: float) -> FloatArray:
-        offset = rng.normal(0.0, 1.0, 3) * bias
-        spoiled: FloatArray = true + offset + rng.normal(0.0, 1.0, (n, 3)) * (noise * root_rate)
-        return spoiled
-
-    truth = Orientation.from_rotation(motion.time, rotation, "NED", name="truth").to_frame(frame)
-    moving = np.linalg.norm(gyr, axis=1) > 1e-6
-    return Recording(
-        motion.time,
-        spoil(gyr, errors.gyr_noise, errors.gyr_bias),
-        spoil(acc, errors.acc_noise, errors.acc_bias),
-        spoil(mag, errors.mag_noise, errors.mag_bias),
-        reference=truth,
-        movement=moving if moving.any() else None,
-        frame=check_frame(frame),
-        name=name,
-    )
+    parts = list(_parts(motion, errors, seed, rate, time, field, gravity, position, disturbances))
+    joined = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
+    return _recording(joined, check_frame(frame), name or motion.name, keep_movement=bool(joined["movement"].any()))
 
 
-def simulate(duration: float = 60.0, *, rate: float = 100.0, seed: int = 0, frame: str = "NED") -> Recording:
-    """Recording of a handheld low-cost sensor in smooth random motion, with its truth.
+def measure_chunks(
+    motion: Motion,
+    errors: SensorErrors | None = None,
+    seed: Seed = 0,
+    *,
+    chunk: int = 65536,
+    rate: float = 100.0,
+    time: npt.ArrayLike | None = None,
+    field: npt.ArrayLike | None = None,
+    gravity: float = STANDARD_GRAVITY,
+    position: npt.ArrayLike = (0.0, 0.0, 0.0),
+    disturbances: Sequence[Dipole] = (),
+    frame: str = "NED",
+    name: str | None = None,
+) -> Iterator[Recording]:
+    """Let sensors measure a motion of any length in little memory.
 
     Parameters
     ----------
-    duration : float
-        Length, s.
-    rate : float
-        Sampling rate, Hz.
-    seed : int
-        The same seed gives the same recording.
-    frame : {"NED", "ENU", "NWU"}
-        Frame in which the recording states its truth.
+    chunk : int
+        Samples in each of the recordings, of which the last may be shorter.
+    motion, errors, seed, rate, time, field, gravity, position, disturbances, frame, name
+        See `measure`.
 
-    Returns
-    -------
+    Yields
+    ------
     Recording
-        With `reference` (the truth at every sample) and `movement`.
+        The next part. Together they are byte by byte what `measure` returns, except that `movement` is always given.
     """
-    duration = check_number("duration", duration, low=1.0, unit="s")
-    rate = check_number("rate", rate, low=1.0, high=10_000.0, unit="Hz")
-    rng = np.random.default_rng(seed)
-    motion = random_motion(duration, rate, rng)
-    return measure(motion, LOW_COST, rng, frame=frame, name=f"simulated-{seed}")
+    if chunk < 1:
+        raise InputError(expected("a chunk of one sample or more", f"{chunk}"))
+    check_frame(frame)
+    waiting: list[dict[str, npt.NDArray[Any]]] = []
+    count = 0
+    for part in _parts(motion, errors, seed, rate, time, field, gravity, position, disturbances):
+        waiting.append(part)
+        count += len(part["time"])
+        if count < chunk:
+            continue
+        joined = {k: np.concatenate([p[k] for p in waiting]) for k in part}
+        done = count - count % chunk
+        for first in range(0, done, chunk):
+            some = {k: v[first : first + chunk] for k, v in joined.items()}
+            yield _recording(some, check_frame(frame), name or motion.name, keep_movement=True)
+        waiting = [{k: v[done:] for k, v in joined.items()}]
+        count -= done
+    if count:
+        joined = {k: np.concatenate([p[k] for p in waiting]) for k in waiting[0]}
+        yield _recording(joined, check_frame(frame), name or motion.name, keep_movement=True)
+
+
+def _parts(
+    motion: Motion,
+    errors: SensorErrors | None,
+    seed: Seed,
+    rate: float,
+    time: npt.ArrayLike | None,
+    field: npt.ArrayLike | None,
+    gravity: float,
+    position: npt.ArrayLike,
+    disturbances: Sequence[Dipole],
+) -> Iterator[dict[str, npt.NDArray[Any]]]:
+    if not isinstance(motion, Motion):
+        raise InputError(expected("a Motion", type(motion).__name__))
+    for dipole in disturbances:
+        if not isinstance(dipole, Dipole):
+            raise InputError(expected("disturbances that are Dipoles", type(dipole).__name__))
+    field_n = 50.0 * np.array([np.cos(np.deg2rad(65.0)), 0.0, np.sin(np.deg2rad(65.0))])
+    bench = Bench(
+        motion,
+        SensorErrors() if errors is None else errors,
+        check_seed(seed),
+        rate=rate,
+        time=time,
+        field=field_n if field is None else vector("field", field),
+        gravity=check_number("gravity", gravity, low=0.0, unit="m/s²"),
+        position=vector("position", position),
+        disturbances=tuple(disturbances),
+    )
+    yield from bench.blocks()
+
+
+def _recording(part: dict[str, npt.NDArray[Any]], frame: Any, name: str, *, keep_movement: bool) -> Recording:
+    quat: FloatArray = np.ascontiguousarray(quaternions.normalize(part["quat"].T).T)
+    truth = Orientation(part["time"], quat, "NED", gyr_bias=part.get("gyr_bias"), name="truth").to_frame(frame)
+    return Recording(
+        part["time"],
+        part.get("gyr"),
+        part.get("acc"),
+        part.get("mag"),
+        reference=truth,
+        movement=part["movement"] if keep_movement else None,
+        frame=frame,
+        name=name,
+    )

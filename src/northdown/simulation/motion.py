@@ -1,90 +1,218 @@
-"""Smooth random motion of a rigid body, from splines, with exact derivatives."""
+"""`Motion`: what a body does, as functions of time with exact derivatives.
+
+Two laws make a motion: a `Turning` for the attitude and a `Path` for the position. Either can be asked at any times,
+in any order, and its derivatives are those of the same function, not differences.
+
+========================= ============================== ======================
+symbol                    name                           unit, axes
+========================= ============================== ======================
+R (body → NED)            ``quat``, ``rotation``
+ω,  Ṙ = R [ω×]            ``rate``                       rad/s, body
+ω̇                         ``angular_acceleration``       rad/s², body
+p, v = ṗ, a = v̇           ``position``, ``velocity``,    m, m/s, m/s², NED
+                          ``acceleration``
+========================= ============================== ======================
+"""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
-from northdown._validation import FloatArray
+from northdown._validation import FloatArray, as_float_array, check_number
+from northdown.errors import InputError, expected
+from northdown.orientation import Orientation
+from northdown.simulation import _quaternions as quaternions
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+STANDARD_GRAVITY = 9.80665
+"""m/s² (CGPM 1901)."""
+
+
+class Turning(ABC):
+    """Attitude as a function of time.
+
+    Attributes
+    ----------
+    span : tuple of two floats
+        First and last time (s) at which it is defined.
+    """
+
+    span: tuple[float, float] = (-math.inf, math.inf)
+
+    @abstractmethod
+    def evaluate(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Attitude and its derivatives.
+
+        Parameters
+        ----------
+        time : (N,) array
+            Times within `span`, s.
+
+        Returns
+        -------
+        quat, rate, angular_acceleration : (4, N), (3, N), (3, N) arrays
+            Unit quaternions (w, x, y, z) from body to NED; body rate, rad/s; its derivative in body axes, rad/s².
+        """
+
+    def quat(self, time: FloatArray) -> FloatArray:
+        """Attitude alone, (4, N); laws that can do this faster override it."""
+        return self.evaluate(time)[0]
+
+
+class Path(ABC):
+    """Position of the body's origin as a function of time; `span` as for `Turning`."""
+
+    span: tuple[float, float] = (-math.inf, math.inf)
+
+    @abstractmethod
+    def evaluate(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position (m), velocity (m/s) and acceleration (m/s²) in NED, each (3, N), at times (N,) in s."""
+
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """Motion of a body, sampled.
+class Kinematics:
+    """State of a motion at given times.
 
     Parameters
     ----------
     time : (N,) array
         Time, s.
-    rotation : Rotation of length N
-        Body → NED.
-    acceleration : (N, 3) array
-        Acceleration of the body's origin, NED, m/s².
+    quat : (N, 4) array
+        Unit quaternions (w, x, y, z), body to NED.
+    rate, angular_acceleration : (N, 3) arrays
+        Body rate, rad/s, and its derivative, rad/s², in body axes.
+    position, velocity, acceleration : (N, 3) arrays
+        Of the body's origin in NED: m, m/s, m/s².
     """
 
     time: FloatArray
-    rotation: Rotation
+    quat: FloatArray
+    rate: FloatArray
+    angular_acceleration: FloatArray
+    position: FloatArray
+    velocity: FloatArray
     acceleration: FloatArray
 
+    @cached_property
+    def rotation(self) -> Rotation:
+        """SciPy `Rotation` of length N, body to NED."""
+        return quaternions.to_rotation(self.quat.T)
 
-def random_motion(
-    duration: float,
-    rate: float,
-    rng: np.random.Generator,
-    *,
-    turn: float = 0.8,
-    reach: float = 0.15,
-    period: float = 1.5,
-    rest: float = 5.0,
-) -> Motion:
-    """Handheld-like motion: rest, then smooth random turns and shifts, then rest.
+    def specific_force(
+        self, gravity: float = STANDARD_GRAVITY, position: npt.ArrayLike = (0.0, 0.0, 0.0)
+    ) -> FloatArray:
+        """What error-free accelerometers measure, (N, 3), in body axes, m/s².
+
+        Parameters
+        ----------
+        gravity : float
+            m/s², down.
+        position : (3,) array
+            Place of the accelerometers in the body, m.
+
+        Notes
+        -----
+        f = Rᵀ (a − g) + ω̇ × r + ω × (ω × r).
+        """
+        arm = vector("position", position)
+        free = self.acceleration - np.array([0.0, 0.0, gravity])
+        force = quaternions.rotate_inverse(self.quat.T, free.T).T
+        turning = np.cross(self.angular_acceleration, arm) + np.cross(self.rate, np.cross(self.rate, arm))
+        return np.ascontiguousarray(force + turning)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of a rigid body, from `start` to `stop`.
 
     Parameters
     ----------
-    duration, rate : float
-        Length in s and sampling rate in Hz.
-    rng : numpy.random.Generator
-        Source of the randomness.
-    turn : float
-        Standard deviation (rad) of the turn from one knot to the next. Raising it makes the motion faster.
-    reach : float
-        Standard deviation (m) of the position at the knots. Raising it makes for more linear acceleration.
-    period : float
-        Time between knots, s. Raising it makes the motion slower.
-    rest : float
-        Rest at both ends, s; shortened to a quarter of the duration where that is less.
-
-    Notes
-    -----
-    Attitude is a `scipy.spatial.transform.RotationSpline` through random knots, position a quintic spline
-    with vanishing velocity and acceleration at its ends.
+    turning : Turning
+        Its attitude.
+    path : Path
+        Its position.
+    start, stop : float
+        Span of time in which it is of interest, s; inside the spans of both laws.
+    name : str
+        For the names of recordings.
     """
-    from scipy.interpolate import make_interp_spline
-    from scipy.spatial.transform import Rotation, RotationSpline
 
-    n = int(np.floor(duration * rate + 1e-9)) + 1
-    time = np.arange(n) / rate
-    rest = min(rest, 0.25 * duration)
-    count = max(3, round((duration - 2.0 * rest) / period) + 1)
-    knots = np.linspace(rest, duration - rest, count)
-    turns = Rotation.from_rotvec(rng.normal(0.0, turn, (count, 3)))
-    attitude = [Rotation.from_euler("ZYX", [rng.uniform(-np.pi, np.pi), 0.1, -0.05])]
-    for k in range(1, count):
-        attitude.append(attitude[-1] * turns[k])
-    # the first and last knots stand twice, so that the spline leaves and arrives at rest
-    ends = 0.5 * period
-    rotations = Rotation.concatenate([attitude[0], *attitude, attitude[-1]])
-    spline = RotationSpline(np.concatenate([[knots[0] - ends], knots, [knots[-1] + ends]]), rotations)
-    inside = np.clip(time, knots[0] - ends, knots[-1] + ends)
-    position = rng.normal(0.0, reach, (count, 3))
-    position[[0, -1]] = 0.0
-    free = [(1, np.zeros(3)), (2, np.zeros(3))]
-    path = make_interp_spline(knots, position, k=5, bc_type=(free, free))  # type: ignore[arg-type]
-    moving = (time > knots[0]) & (time < knots[-1])
-    acceleration = np.where(moving[:, None], path.derivative(2)(np.clip(time, knots[0], knots[-1])), 0.0)
-    return Motion(time, spline(inside), acceleration)
+    turning: Turning
+    path: Path
+    start: float
+    stop: float
+    name: str = "motion"
+
+    def __post_init__(self) -> None:
+        check_number("start", self.start, unit="s")
+        check_number("stop", self.stop, above=float(self.start), unit="s")
+        low, high = self.span
+        if self.start < low or self.stop > high:
+            raise InputError(
+                expected(f"a motion from {low:g} to {high:g} s at most", f"{self.start:g} to {self.stop:g} s")
+            )
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time (s) at which both laws are defined."""
+        a, b = self.turning.span, self.path.span
+        return max(a[0], b[0]), min(a[1], b[1])
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        return self.stop - self.start
+
+    def times(self, rate: float) -> FloatArray:
+        """Times from start to stop at a constant rate (Hz)."""
+        rate = check_number("rate", rate, above=0.0, unit="Hz")
+        return self.start + np.arange(int(np.floor(self.duration * rate + 1e-9)) + 1) / rate
+
+    def orientation(
+        self, time: npt.ArrayLike | None = None, *, rate: float = 100.0, frame: str = "NED"
+    ) -> Orientation:
+        """The true orientation at given times (s), or at a rate (Hz) from start to stop."""
+        state = self.at(self.times(rate) if time is None else time)
+        return Orientation(state.time, state.quat, "NED", name=self.name).to_frame(frame)
+
+    def at(self, time: npt.ArrayLike) -> Kinematics:
+        """Exact state at any times within `span`.
+
+        Parameters
+        ----------
+        time : float or (N,) array
+            Times, s, in any order.
+
+        Raises
+        ------
+        InputError
+            When a time lies outside the span.
+        """
+        t = np.atleast_1d(as_float_array("time", time))
+        low, high = self.span
+        if t.ndim != 1:
+            raise InputError(expected("time of shape (N,)", f"shape {t.shape}"))
+        outside = ~((t >= low) & (t <= high))
+        if outside.any():
+            at = int(np.argmax(outside))
+            raise InputError(expected(f"times from {low:g} to {high:g} s", f"{t[at]:g} s", at=at))
+        quat, rate, angular = self.turning.evaluate(t)
+        rows = [quat, rate, angular, *self.path.evaluate(t)]
+        return Kinematics(t, *(np.ascontiguousarray(x.T) for x in rows))
+
+
+def vector(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Check three finite numbers."""
+    array = as_float_array(name, value)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise InputError(expected(f"three finite numbers for {name}", f"{array.tolist()}"))
+    return array

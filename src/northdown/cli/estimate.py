@@ -1,0 +1,70 @@
+"""``northdown estimate``: run one estimator over a recording."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from northdown.cli import console, gate
+from northdown.cli.output import FIGURE_SUFFIXES, ORIENTATION_SUFFIXES, check_target, write_orientation
+from northdown.cli.parameters import read_assignments
+from northdown.cli.reading import Reading, reads_recording
+from northdown.cli.selection import DEFAULT_ESTIMATOR, check_sensors
+from northdown.cli.summary import summarise
+
+if TYPE_CHECKING:
+    from northdown.orientation import Orientation
+    from northdown.recording import Recording
+
+
+@reads_recording
+def estimate(
+    reading: Reading,
+    estimator: Annotated[
+        str, typer.Option("--estimator", "-e", metavar="NAME", help="See 'northdown estimators'.")
+    ] = DEFAULT_ESTIMATOR,
+    parameter: Annotated[
+        list[str], typer.Option("--parameter", "-p", metavar="NAME=VALUE", help="Such as kp=0.5; repeatable.")
+    ] = [],  # noqa: B006  (typer copies it)
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write .csv, .parquet or .tum; '-': CSV here."),
+    ] = None,
+    plot: Annotated[
+        str | None, typer.Option("--plot", metavar="FILE", help="Draw the Euler angles: .png, .svg or .pdf.")
+    ] = None,
+    max_gap: gate.MaxGap = gate.MAX_GAP_TEXT,
+    force: gate.Force = False,
+) -> None:
+    """Estimate the orientation over a recording, and sum it up."""
+    from northdown.estimators import get
+
+    chosen = get(estimator)
+    configured = chosen(**read_assignments(chosen, parameter))
+    if output is not None and output != "-":
+        check_target("--output", output, source=reading.source, suffixes=ORIENTATION_SUFFIXES)
+    if plot is not None:
+        check_target("--plot", plot, source=reading.source, suffixes=FIGURE_SUFFIXES)
+    longest = gate.read_max_gap(max_gap)
+    recording = reading.load()
+    check_sensors(chosen, recording)
+    gate.admit(recording, [chosen], max_gap=longest, force=force)
+    orientation = configured.run(recording, max_gap=longest)
+    rows = summarise(recording, configured, orientation)
+    if output is not None:
+        write_orientation(orientation, output)
+    if plot is not None:
+        _draw(orientation, recording, plot)
+    written = [name for name in (output, plot) if name not in (None, "-")]
+    if written:
+        rows.append(("Written", ", ".join(str(name) for name in written)))
+    console.facts(rows, sys.stderr if output == "-" else sys.stdout)
+
+
+def _draw(orientation: Orientation, recording: Recording, path: str) -> None:
+    from northdown import plots
+
+    truth = recording if recording.reference is not None else None
+    plots.save(plots.euler(orientation, truth), path)

@@ -1,0 +1,166 @@
+r"""K06's reference filter: quaternion driven by the gyroscope, measured as Euler angles.
+
+State q, predicted with the gyroscope (K06 (2.16), here by the closed form). Measurement: roll, pitch and yaw that
+accelerometer and magnetometer give at one sample (`tilt_compass`), compared with those of q (K06 (2.15)):
+
+.. math::
+
+    z = (\phi, \theta, \psi), \qquad H = J^{-1} \cdot 2 E^{\mathsf T}, \qquad
+    E_j = (0, e_j) \otimes q
+
+where δ_j = 2 ⟨E_j, δq⟩ is the rotation about north, east and down, and J⁻¹ turns it into angles: dφ = (δ_x cos ψ +
+δ_y sin ψ) / cos θ, dθ = −δ_x sin ψ + δ_y cos ψ, dψ = δ_z + sin θ dφ. Variances follow from the sensors' noise in
+the same way; their correlation is left out, as K06 leaves it. Residuals are wrapped to ±π.
+
+There is no bias state, and the measurement is singular at pitch ±90°: samples beyond `singular_pitch` are flagged
+and not used, and the filter runs on the gyroscope.
+
+Source: C.-F. Kao, thesis, National Chiao Tung University, 2006 (K06), section 4-5 and figure 4.59. It is the
+filter with which its gyro-free ones are compared in table 4.14.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from northdown._validation import FloatArray
+from northdown.estimators._kalman import KalmanFilter
+from northdown.estimators._quaternion_kalman import N_STATE, aligned, flagged, predict
+from northdown.estimators.base import parameter
+from northdown.frames import Frame
+from northdown.kernels import euler
+from northdown.kernels.jit import inline
+from northdown.kernels.kalman import attitude_covariance, correct7, quaternion_covariance
+from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
+from northdown.kernels.runner import Kernel
+from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
+from northdown.kernels.weighting import field_departure, linear_acceleration
+from northdown.orientation import Flag
+
+_NEAR_SINGULAR = int(Flag.NEAR_SINGULAR)
+
+
+@inline
+def correct_angles(cov: Any, q: Any, angles: Any, residual: Any, r: Any) -> Any:
+    """Three scalar updates with roll, pitch and yaw; returns (P, correction)."""
+    w, x, y, z = q
+    e0, e1, e2 = (-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)
+    sp, cp = math.sin(angles[1]), math.cos(angles[1])
+    sy, cy = 2.0 * math.sin(angles[2]), 2.0 * math.cos(angles[2])
+    a, b = cy / cp, sy / cp
+    roll = (
+        a * e0[0] + b * e1[0],
+        a * e0[1] + b * e1[1],
+        a * e0[2] + b * e1[2],
+        a * e0[3] + b * e1[3],
+    )
+    pitch = (
+        cy * e1[0] - sy * e0[0],
+        cy * e1[1] - sy * e0[1],
+        cy * e1[2] - sy * e0[2],
+        cy * e1[3] - sy * e0[3],
+    )
+    yaw = (
+        2.0 * e2[0] + sp * roll[0],
+        2.0 * e2[1] + sp * roll[1],
+        2.0 * e2[2] + sp * roll[2],
+        2.0 * e2[3] + sp * roll[3],
+    )
+    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    cov, d = correct7(cov, d, roll, residual[0], r[0])
+    cov, d = correct7(cov, d, pitch, residual[1], r[1])
+    return correct7(cov, d, yaw, residual[2], r[2])
+
+
+@inline
+def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
+    """One sample; the state is that of `_quaternion_kalman` with a bias of zero and of zero variance."""
+    acc_var, motion_time, motion_window, mag_var, g = p[3:8]
+    cov = s[7:35]
+    motion, age = s[35], s[36] + dt
+    field = (s[38], s[39], s[40])
+    u = 0.0
+
+    q, cov = predict(p, (s[0], s[1], s[2], s[3]), (0.0, 0.0, 0.0), cov, gyr, dt)
+
+    if age > 0.0 and dot(acc, acc) > 0.0 and has_heading(acc, mag):
+        level = multiply(tilt_correction(q, acc), q)
+        measured = euler.to_zyx(turn_about_down(heading_error(level, mag), level))
+        angles = euler.to_zyx(q)
+        motion = linear_acceleration(motion, rotate(q, acc), g, age, motion_window)
+        u, field = field_departure((p[8], p[9], p[10]), field, rotate(level, mag), age)
+        if math.fabs(angles[1]) < p[14]:
+            tilt = (acc_var + motion_time * motion) / (g * g * age)
+            slope = dot(down_b(level), mag)
+            square = max(dot(mag, mag) - slope * slope, 1e-12 * dot(mag, mag))
+            slope2 = slope * slope / square
+            heading = mag_var * (1.0 + slope2) * math.exp(u) / age + slope2 * tilt
+            c2 = math.cos(angles[1]) * math.cos(angles[1])
+            r = (tilt / c2, tilt, heading + tilt * (1.0 - c2) / c2)
+            residual = (
+                euler.wrap(measured[0] - angles[0]),
+                euler.wrap(measured[1] - angles[1]),
+                euler.wrap(measured[2] - angles[2]),
+            )
+            cov, d = correct_angles(cov, q, angles, residual, r)
+            q = normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3]))
+        age = 0.0
+    return q + (0.0, 0.0, 0.0) + cov + (motion, age, 0.0) + field + (u,)
+
+
+@inline
+def output(p: Any, s: Any) -> Any:
+    """Attitude, covariance of its rotation vector in navigation axes, field's departure u."""
+    q = (s[0], s[1], s[2], s[3])
+    return q + attitude_covariance(s[7:35], q) + (s[41],)
+
+
+@inline
+def flags(p: Any, s: Any) -> int:
+    """Whether the magnetometer's sample was all but rejected, and whether pitch is near ±90°."""
+    down = down_b((s[0], s[1], s[2], s[3]))
+    return flagged(p, s) | (_NEAR_SINGULAR if math.fabs(down[0]) > math.sin(p[14]) else 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GyroEulerEKF(KalmanFilter):
+    """Quaternion EKF measured by Euler angles, without bias: K06's reference; not for attitudes near pitch ±90°.
+
+    Parameters
+    ----------
+    singular_pitch : float
+        Pitch (rad) beyond which measurements are not used and samples are flagged. Raising it uses more of them,
+        nearer to where they mean nothing.
+
+    References
+    ----------
+    K06 section 4-5.
+    """
+
+    name = "gyro-euler-ekf"
+    needs = ("gyr", "acc", "mag")
+    kernel = Kernel(
+        "gyro-euler-ekf",
+        step,
+        n_params=15,
+        n_state=N_STATE,
+        n_out=11,
+        output=output,
+        aligned=aligned,
+        flagged=flags,
+    )
+    outputs = {"covariance": slice(4, 10), "field_departure": slice(10, 11)}  # noqa: RUF012  (constant)
+    singular = "pitch ±90°"
+
+    singular_pitch: float = parameter(1.4, unit="rad", low=0.0, high=1.5708)
+
+    def _parameters(self, frame: Frame) -> Sequence[float]:
+        return (*self._noise(), self.singular_pitch)
+
+    def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
+        noise = self._noise()
+        covariance = quaternion_covariance(tuple(quat), noise.tilt, noise.heading, 0.0)
+        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)

@@ -1,0 +1,197 @@
+r"""Multiplicative (error-state) extended Kalman filter with gyroscope bias.
+
+The attitude is a quaternion; the filter's state is the small error about it, in NED axes, and the bias:
+
+.. math::
+
+    R_{nb} = \exp(\delta)\, \hat R_{nb}, \qquad \dot\delta = -\hat R_{nb}\,(b - \hat b) + \hat R_{nb}\,w_g, \qquad
+    \dot b = w_b
+
+In navigation axes the transition matrix is simply [[I, −R̂Δt], [0, I]], and isotropic gyroscope noise needs no
+rotation.
+
+Accelerometer: f_n = R̂ f_b should be (0, 0, −g). To first order f_n / g = (δ_y, −δ_x, ·): two scalar measurements,
+each of one component of the error. Linear acceleration is noise with the spectral density that its own mean square
+suggests:
+
+.. math::  R_a = \bigl(\sigma_a^2 + \tau_m\, \overline{\lVert f_n - (0,0,-g) \rVert^2}\bigr) / (g^2\, \Delta t)
+
+with the mean taken over `motion_window` seconds and τ_m (`motion_time`) the time over which accelerations stay
+correlated.
+
+Magnetometer: the heading ε = atan2(h_y, h_x) of h = R̂ m_b, one scalar:
+
+.. math::  \varepsilon = -\delta_z + \delta_x\, h_z / h_h, \qquad
+           R_m = \sigma_m^2 / (B_h^2\, \Delta t) \cdot e^{u}, \qquad
+           u = (\Delta\lVert m \rVert / \lVert m \rVert / w_1)^2 + (\Delta\text{dip} / w_2)^2
+
+so that a disturbed field, known by its norm or its dip, is weighted down smoothly. Norm and dip are compared with a
+reference, the mean of the past over `field_window`, weighted by e⁻ᵘ; the first second is not judged. A sample with
+u above 4.6, that is, of less than 1 % of its weight, carries the flag `MAG_REJECTED`.
+
+Δt is the time since that sensor's last sample: densities in, variances of samples out. Components are uncorrelated,
+so that the update is a sequence of scalar ones.
+
+Sources: F. L. Markley, J. Guidance Control Dynamics 26(2), 2003, doi:10.2514/2.5048; J. Solà, arXiv:1711.02508
+(2017), section 7 (global angular errors). The weighting of both sensors is this project's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from northdown._validation import FloatArray
+from northdown.estimators._kalman import BiasKalmanFilter
+from northdown.frames import Frame
+from northdown.kernels.direction_error import is_sample
+from northdown.kernels.jit import inline
+from northdown.kernels.kalman import propagate_attitude_bias, reduce6
+from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
+from northdown.kernels.runner import Kernel
+from northdown.kernels.so3 import exp
+from northdown.kernels.wahba import has_heading
+from northdown.kernels.weighting import REJECTED, field_departure, linear_acceleration
+from northdown.orientation import Flag
+
+_MAG_REJECTED = int(Flag.MAG_REJECTED)
+
+
+@inline
+def correct_tilt(p: Any, d: Any, force: Any, r: float) -> Any:
+    """Two scalar updates with the horizontal specific force in units of g; returns (P, correction)."""
+    # f_x = δ_y
+    k = 1.0 / (p[6] + r)
+    y = (force[0] - d[1]) * k
+    h = (p[1], p[6], p[7], p[8], p[9], p[10])
+    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
+    p = reduce6(p, h, k)
+    # f_y = −δ_x; with h = P[:, 0] the two minus signs cancel in the covariance
+    k = 1.0 / (p[0] + r)
+    y = -(force[1] + d[0]) * k
+    h = (p[0], p[1], p[2], p[3], p[4], p[5])
+    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
+    return reduce6(p, h, k), d
+
+
+@inline
+def correct_heading(p: Any, d: Any, heading: float, slope: float, r: float) -> Any:
+    """Scalar update with ε = slope δ_x − δ_z; returns (P, correction)."""
+    h = (
+        slope * p[0] - p[2],
+        slope * p[1] - p[7],
+        slope * p[2] - p[11],
+        slope * p[3] - p[12],
+        slope * p[4] - p[13],
+        slope * p[5] - p[14],
+    )
+    k = 1.0 / (slope * h[0] - h[2] + r)
+    y = (heading - (slope * d[0] - d[2])) * k
+    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
+    return reduce6(p, h, k), d
+
+
+@inline
+def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
+    """One sample; s = (w, x, y, z, b, P, motion, age of acc, age of mag, field's norm, dip and age, u)."""
+    gyr_var, scale_var, walk_var, acc_var, motion_time, motion_window, mag_var, g, norm_gate, dip_gate, window = p[
+        :11
+    ]
+    q = (s[0], s[1], s[2], s[3])
+    bx, by, bz = s[4], s[5], s[6]
+    cov = s[7:28]
+    motion, age_acc, age_mag = s[28], s[29] + dt, s[30] + dt
+    field = (s[31], s[32], s[33])
+    u = 0.0
+
+    rate = (gyr[0] - bx, gyr[1] - by, gyr[2] - bz)
+    if dt > 0.0:
+        w, x, y, z = q
+        a = (
+            dt * (1.0 - 2.0 * (y * y + z * z)),
+            dt * 2.0 * (x * y - w * z),
+            dt * 2.0 * (x * z + w * y),
+            dt * 2.0 * (x * y + w * z),
+            dt * (1.0 - 2.0 * (x * x + z * z)),
+            dt * 2.0 * (y * z - w * x),
+            dt * 2.0 * (x * z - w * y),
+            dt * 2.0 * (y * z + w * x),
+            dt * (1.0 - 2.0 * (x * x + y * y)),
+        )
+        cov = propagate_attitude_bias(cov, a, (gyr_var + scale_var * dot(rate, rate)) * dt, walk_var * dt)
+        q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
+
+    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if is_sample(acc) and age_acc > 0.0:
+        f = rotate(q, acc)
+        motion = linear_acceleration(motion, f, g, age_acc, motion_window)
+        r = (acc_var + motion_time * motion) / (g * g * age_acc)
+        cov, d = correct_tilt(cov, d, (f[0] / g, f[1] / g), r)
+        age_acc = 0.0
+    if has_heading(down_b(q), mag) and age_mag > 0.0:
+        h = rotate(q, mag)
+        u, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
+        square = h[0] * h[0] + h[1] * h[1]
+        r = mag_var * (1.0 + h[2] * h[2] / square) * math.exp(u) / age_mag
+        cov, d = correct_heading(cov, d, math.atan2(h[1], h[0]), h[2] / math.sqrt(square), r)
+        age_mag = 0.0
+    q = normalize(multiply(exp((d[0], d[1], d[2])), q))
+    return q + (bx + d[3], by + d[4], bz + d[5]) + cov + (motion, age_acc, age_mag) + field + (u,)
+
+
+@inline
+def start_covariance(p: Any, heading_known: bool) -> Any:
+    """Upper triangle of P for a fresh attitude; an unknown heading is uniform over the circle."""
+    tilt, heading, bias = p[11], p[12], p[13]
+    if not heading_known:
+        heading = math.pi * math.pi / 3.0
+    zero3, zero2 = (0.0, 0.0, 0.0), (0.0, 0.0)
+    rows = (tilt, 0.0, 0.0) + zero3 + (tilt, 0.0) + zero3 + (heading,) + zero3
+    return rows + (bias,) + zero2 + (bias, 0.0, bias)
+
+
+@inline
+def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
+    """State for an attitude found from the sensors."""
+    return q + s[4:7] + start_covariance(p, heading_known) + s[28:]
+
+
+@inline
+def output(p: Any, s: Any) -> Any:
+    """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u."""
+    sigma = (math.sqrt(s[22]), math.sqrt(s[25]), math.sqrt(s[27]))
+    return s[:7] + (s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (s[34],)
+
+
+@inline
+def flagged(p: Any, s: Any) -> int:
+    """Whether the magnetometer's sample was all but rejected."""
+    return _MAG_REJECTED if s[34] > REJECTED else 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class MEKF(BiasKalmanFilter):
+    """Multiplicative extended Kalman filter: attitude, gyroscope bias, and their covariance.
+
+    References
+    ----------
+    F. L. Markley, J. Guidance Control Dynamics 26(2), 2003; J. Solà, arXiv:1711.02508, 2017, section 7.
+    """
+
+    name = "mekf"
+    kernel = Kernel("mekf", step, n_params=14, n_state=35, n_out=17, output=output, aligned=aligned, flagged=flagged)
+    outputs = {  # noqa: RUF012  (a constant of the class)
+        "gyr_bias": slice(4, 7),
+        "covariance": slice(7, 13),
+        "gyr_bias_sigma": slice(13, 16),
+        "field_departure": slice(16, 17),
+    }
+
+    def _parameters(self, frame: Frame) -> Sequence[float]:
+        return self._bias_noise()
+
+    def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
+        covariance = start_covariance(self._parameters(frame), True)
+        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)

@@ -1,0 +1,120 @@
+r"""Quaternion extended Kalman filter: seven states (attitude quaternion, gyroscope bias), six measurements at once.
+
+.. math::
+
+    q_{k+1} = q_k \otimes \exp\bigl((\omega - b)\,\Delta t\bigr), \qquad
+    z = \begin{pmatrix} f_b / g \\ m_b / \lVert m_b \rVert \end{pmatrix}, \qquad
+    h(q) = \begin{pmatrix} R_{nb}^{\mathsf T}\, u_n \\ R_{nb}^{\mathsf T}\, m_n \end{pmatrix}
+
+with u_n = (0, 0, −1) and m_n = (cos D, 0, sin D), D the dip. The derivative of h is that of the homogeneous form
+(w² + x² − y² − z² for 1 − 2(y² + z²)). Gyroscope noise of density σ enters each component of the quaternion with
+¼σ²Δt. The quaternion is renormalised after each update; its norm is observed through the accelerometer, so that P
+stays positive definite.
+
+The six measurements have uncorrelated noise and are taken one after the other with the linearisation of the
+first, which equals the stacked update (10)–(13) and needs no inverse. A missing sensor's rows are left out.
+
+Linear acceleration and magnetic disturbance raise the measurement noise as in `mekf`, whose docstring gives the
+formulas. Unlike there the whole direction of the field is used, so a wrong dip tilts the result.
+
+Source: R.-C. Jia, Optics and Precision Engineering 22(12), 2014, doi:10.3788/OPE.20142212.3280 (J14), section 2.
+
+Deviations: J14's P(0) is σ²/T of each sensor, which presumes a start at rest and a known T; here the start's
+uncertainty is given in radians, and P(0) = ¼ Ξ diag(tilt², tilt², heading²) Ξᵀ, its (7). Vectors are normalised; the
+disturbance weighting is added (`motion_time=0` and wide gates switch it off). In J14 (6) q2 uses T13 − T31.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from northdown.estimators._quaternion_kalman import (
+    N_OUT,
+    N_STATE,
+    QuaternionKalmanFilter,
+    aligned,
+    flagged,
+    output,
+    predict,
+)
+from northdown.estimators.base import parameter
+from northdown.frames import Frame
+from northdown.kernels.direction_error import is_sample
+from northdown.kernels.jit import inline
+from northdown.kernels.kalman import correct_direction
+from northdown.kernels.quaternion import dot, normalize, rotate, unit
+from northdown.kernels.runner import Kernel
+from northdown.kernels.weighting import field_departure, linear_acceleration
+from northdown.orientation import Flag
+
+_MAG_REJECTED = int(Flag.MAG_REJECTED)
+
+
+@inline
+def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
+    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's norm, dip and age, u)."""
+    acc_var, motion_time, motion_window, mag_var, g = p[3:8]
+    q, b = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6])
+    cov = s[7:35]
+    motion, age_acc, age_mag = s[35], s[36] + dt, s[37] + dt
+    field = (s[38], s[39], s[40])
+    u = 0.0
+
+    q, cov = predict(p, q, b, cov, gyr, dt)
+
+    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if is_sample(acc) and age_acc > 0.0:
+        motion = linear_acceleration(motion, rotate(q, acc), g, age_acc, motion_window)
+        r = (acc_var + motion_time * motion) / (g * g * age_acc)
+        cov, d = correct_direction(cov, d, q, (acc[0] / g, acc[1] / g, acc[2] / g), 0.0, -1.0, r)
+        age_acc = 0.0
+    if dot(mag, mag) > 0.0 and age_mag > 0.0:
+        u, field = field_departure((p[8], p[9], p[10]), field, rotate(q, mag), age_mag)
+        dip = p[14] if p[14] == p[14] else field[1]
+        r = mag_var * math.exp(u) / age_mag
+        cov, d = correct_direction(cov, d, q, unit(mag), math.cos(dip), math.sin(dip), r)
+        age_mag = 0.0
+    q = normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3]))
+    return q + (b[0] + d[4], b[1] + d[5], b[2] + d[6]) + cov + (motion, age_acc, age_mag) + field + (u,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuaternionEKF(QuaternionKalmanFilter):
+    """Quaternion EKF with gyroscope bias and stacked measurement of gravity and field.
+
+    Noise densities are those that an Allan deviation gives; the defaults are larger and stand also for what the model
+    leaves out, see `MEKF`.
+
+    Parameters
+    ----------
+    dip : float or None
+        Angle of the field below the horizontal, rad. None: the mean of the past over
+        `field_window`. Raising it tips the result about the east axis.
+
+    References
+    ----------
+    R.-C. Jia, Optics and Precision Engineering 22(12), 2014, section 2.
+    """
+
+    name = "quaternion-ekf"
+    kernel = Kernel(
+        "quaternion-ekf",
+        step,
+        n_params=15,
+        n_state=N_STATE,
+        n_out=N_OUT,
+        output=output,
+        aligned=aligned,
+        flagged=flagged,
+    )
+
+    dip: float | None = parameter(None, unit="rad", low=-1.56, high=1.56)
+
+    def _parameters(self, frame: Frame) -> Sequence[float]:
+        return (
+            *self._bias_noise(),
+            math.nan if self.dip is None else self.dip,
+        )
