@@ -158,8 +158,8 @@ class Complementary(Estimator):
     name = "complementary"
     kernel = Kernel("complementary", step, n_params=10, n_state=6, n_out=4)
 
-    tau_acc: float = parameter(1.0, unit="s", above=0.0)
-    tau_mag: float = parameter(1.0, unit="s", above=0.0)
+    tau_acc: float = parameter(3.0, unit="s", above=0.0)
+    tau_mag: float = parameter(10.0, unit="s", above=0.0)
     gain: Literal["fixed", "adaptive", "fuzzy"] = "fixed"
     low: float = parameter(0.1, low=0.0)
     high: float = parameter(0.2, above=0.0)
