@@ -36,7 +36,7 @@ from northdown.recording import Recording
 
 if TYPE_CHECKING:
     # For editors and type checkers only. At run time estimators are found by their files, see `__getattr__`.
-    from northdown import datasets, estimators, evaluation, frames, io, plots, simulation
+    from northdown import calibration, datasets, estimators, evaluation, fields, frames, io, plots, simulation
     from northdown.estimators.complementary import Complementary
     from northdown.estimators.cross_product import CrossProduct
     from northdown.estimators.double_stage_ekf import DoubleStageEKF
@@ -77,9 +77,11 @@ __all__ = [
     "Triad",
     "align",
     "attitude_error",
+    "calibration",
     "datasets",
     "estimators",
     "evaluation",
+    "fields",
     "frames",
     "io",
     "plots",
@@ -91,7 +93,17 @@ __all__ = [
     "write_recording",
 ]
 
-_MODULES = ("datasets", "estimators", "evaluation", "frames", "io", "plots", "simulation")
+_MODULES = (
+    "calibration",
+    "datasets",
+    "estimators",
+    "evaluation",
+    "fields",
+    "frames",
+    "io",
+    "plots",
+    "simulation",
+)
 _FUNCTIONS = {
     "align": "evaluation",
     "attitude_error": "evaluation",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
 
 _SENSORS = ("mag", "acc", "gyr")
 # Options that concern one sensor only.
-_OF = {"--field": "mag", "--align": "mag", "--gravity": "acc"}
+_OF = {"--field": "mag", "--turn-to": "mag", "--gravity": "acc"}
 # What of a recording's check matters here; a wrong size or a varying field is what calibration is for.
 _KINDS = ("time-unit", "time-rate", "time-backwards", "gyr-unit", "acc-unit")
+# By what the rotation to a sensor's axes is found.
+_METHODS = {"gyr": "gyr", "acc": "dip"}
 _STANDARD_GRAVITY = "9.80665"
 
 
@@ -32,7 +35,7 @@ def calibrate(
     reading: Reading,
     sensor: Annotated[str, typer.Argument(metavar="mag|acc|gyr", help="Which sensor.")],
     more: Annotated[
-        list[str] | None, typer.Argument(metavar="[REC]...", help="Further recordings of the same sensor.")
+        list[str] | None, typer.Argument(metavar="REC", help="Further recordings of the same sensor.")
     ] = None,
     output: Annotated[
         str | None, typer.Option("--output", "-o", metavar="FILE", help="Write the calibration: .toml or .json.")
@@ -45,9 +48,9 @@ def calibrate(
         str | None,
         typer.Option("--field", metavar="UT", help="mag: local field in µT; kept as it is when not given."),
     ] = None,
-    align: Annotated[
+    turn_to: Annotated[
         str | None,
-        typer.Option("--align", metavar="gyr|dip", help="mag: find its rotation to gyroscope or accelerometer too."),
+        typer.Option("--turn-to", metavar="gyr|acc", help="mag: find the rotation to this sensor's axes too."),
     ] = None,
     gravity: Annotated[
         str, typer.Option("--gravity", metavar="M/S2", help="acc: local gravity.")
@@ -72,7 +75,13 @@ def calibrate(
     from northdown._validation import check_choice
 
     check_choice("the sensor", sensor, _SENSORS)
-    given = {"--field": field is not None, "--align": align is not None, "--gravity": gravity != _STANDARD_GRAVITY}
+    if turn_to is not None:
+        check_choice("--turn-to", turn_to, tuple(_METHODS))
+    given = {
+        "--field": field is not None,
+        "--turn-to": turn_to is not None,
+        "--gravity": gravity != _STANDARD_GRAVITY,
+    }
     wrong = [name for name, is_given in given.items() if is_given and _OF[name] != sensor]
     if wrong:
         raise InputError(expected(f"{wrong[0]} with {_OF[wrong[0]]} only", sensor, do="leave it out"))
@@ -85,13 +94,14 @@ def calibrate(
     first = _load(after)
     if first is not None:
         recordings = [first.apply(recording) for recording in recordings]
-    found = _find(sensor, recordings, align, numbers)
+    steps = _find(sensor, recordings, turn_to, numbers)
+    found = functools.reduce(lambda one, other: one.then(other), steps)
     whole = found if first is None else first.then(found)
     written = _write(whole, found, recordings, output, plot)
     if json:
-        console.write_json(_as_dict(found, recordings))
+        console.write_json(_as_dict(found, steps, recordings))
         return
-    _print(found, recordings, written)
+    _print(found, steps, recordings, written)
 
 
 def _check_targets(output: str | None, plot: str | None, sources: list[str]) -> None:
@@ -137,19 +147,22 @@ def _load(path: str | None) -> Calibration | None:
     return load(path)
 
 
-def _find(sensor: str, recordings: list[Recording], align: str | None, numbers: dict[str, float]) -> Calibration:
+def _find(
+    sensor: str, recordings: list[Recording], turn_to: str | None, numbers: dict[str, float]
+) -> list[Calibration]:
+    """What is found, step by step: each is for recordings to which those before it were applied."""
     from northdown import calibration
 
     chosen: dict[str, Any] = {"tolerance": numbers["tolerance"]} if "tolerance" in numbers else {}
     if sensor == "acc":
-        return calibration.calibrate_accelerometer(recordings, gravity=numbers["gravity"], **chosen)
+        return [calibration.calibrate_accelerometer(recordings, gravity=numbers["gravity"], **chosen)]
     if sensor == "gyr":
-        return calibration.calibrate_gyroscope(recordings, **chosen)
+        return [calibration.calibrate_gyroscope(recordings, **chosen)]
     iron = calibration.calibrate_magnetometer(recordings, field=numbers.get("field"), **chosen)
-    if align is None:
-        return iron
+    if turn_to is None:
+        return [iron]
     corrected = [iron.apply(recording) for recording in recordings]
-    return iron.then(calibration.align_magnetometer(corrected, method=align, **chosen))
+    return [iron, calibration.align_magnetometer(corrected, method=_METHODS[turn_to], **chosen)]
 
 
 def _write(
@@ -170,7 +183,7 @@ def _write(
     return written
 
 
-def _as_dict(found: Calibration, recordings: list[Recording]) -> dict[str, Any]:
+def _as_dict(found: Calibration, steps: list[Calibration], recordings: list[Recording]) -> dict[str, Any]:
     part = found.parts[0]
     return {
         "sensor": part.sensor,
@@ -181,16 +194,18 @@ def _as_dict(found: Calibration, recordings: list[Recording]) -> dict[str, Any]:
         "matrix": part.matrix.tolist(),
         "matrix_sigma": part.matrix_sigma.tolist(),
         "norm": part.norm,
-        "evidence": dataclasses.asdict(part.evidence),
+        "steps": [dataclasses.asdict(step.parts[0].evidence) for step in steps],
     }
 
 
-def _print(found: Calibration, recordings: list[Recording], written: list[str]) -> None:
-    from northdown.calibration.words import rows
+def _print(found: Calibration, steps: list[Calibration], recordings: list[Recording], written: list[str]) -> None:
+    from northdown.calibration.words import evidence_rows, rows
 
     part = found.parts[0]
     names = ", ".join(recording.name or "standard input" for recording in recordings)
     facts = [("Recording" if len(recordings) == 1 else "Recordings", names), *rows(part)]
+    for step in steps:
+        facts += evidence_rows(step.parts[0].evidence)
     if written:
         facts.append(("Written", ", ".join(written)))
     console.facts(facts)

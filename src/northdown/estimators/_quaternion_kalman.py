@@ -1,6 +1,6 @@
 """What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
 
-State tuple: quaternion 4, bias 3, P 28, mean square of linear acceleration, ages of acc and mag, field's norm, dip
+State tuple: quaternion 4, bias 3, P 28 (of (e, bias) with δq = e ⊗ q, see `kernels.kalman`), mean square of linear acceleration, ages of acc and mag, field's norm, dip
 and age, departure u of the last field sample.
 """
 
@@ -34,8 +34,9 @@ def predict(p: Any, q: Any, b: Any, cov: Any, gyr: Any, dt: float) -> Any:
     if dt > 0.0:
         turn = exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))
         noise = 0.25 * (p[0] + p[1] * dot(rate, rate)) * dt
-        cov = propagate_quaternion_bias(cov, q, turn, dt, noise, p[2] * dt)
-        q = normalize(multiply(q, turn))
+        after = normalize(multiply(q, turn))
+        cov = propagate_quaternion_bias(cov, q, after, dt, noise, p[2] * dt)
+        q = after
     return q, cov
 
 
@@ -43,15 +44,14 @@ def predict(p: Any, q: Any, b: Any, cov: Any, gyr: Any, dt: float) -> Any:
 def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
     """State for an attitude found from the sensors; an unknown heading is uniform over the circle."""
     heading = p[12] if heading_known else math.pi * math.pi / 3.0
-    return q + s[4:7] + quaternion_covariance(q, p[11], heading, p[13]) + s[35:]
+    return q + s[4:7] + quaternion_covariance(p[11], heading, p[13]) + s[35:]
 
 
 @inline
 def output(p: Any, s: Any) -> Any:
     """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u."""
-    q = (s[0], s[1], s[2], s[3])
     sigma = (math.sqrt(s[29]), math.sqrt(s[32]), math.sqrt(s[34]))
-    return s[:7] + attitude_covariance(s[7:35], q) + sigma + (s[41],)
+    return s[:7] + attitude_covariance(s[7:35]) + sigma + (s[41],)
 
 
 @inline
@@ -73,5 +73,5 @@ class QuaternionKalmanFilter(BiasKalmanFilter):
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         noise = self._bias_noise()
-        covariance = quaternion_covariance(tuple(quat), noise.tilt, noise.heading, noise.bias)
+        covariance = quaternion_covariance(noise.tilt, noise.heading, noise.bias)
         return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)

@@ -52,8 +52,8 @@ from northdown.estimators._quaternion_kalman import (
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct_direction
-from northdown.kernels.quaternion import down_b, multiply, normalize, rotate, unit
+from northdown.kernels.kalman import correct_field, correct_up, relative_to
+from northdown.kernels.quaternion import conjugate, down_b, multiply, normalize, rotate, unit
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
 from northdown.kernels.wahba import has_heading
@@ -64,32 +64,21 @@ _MAG_REJECTED = int(Flag.MAG_REJECTED)
 
 
 @inline
-def rotation_part(q: Any, e: Any) -> Any:
-    """Small rotation δ about north, east and down of the quaternion increment e = ½ (0, δ) ⊗ q + (part along q)."""
-    w, x, y, z = q
-    return (
-        2.0 * (-x * e[0] + w * e[1] - z * e[2] + y * e[3]),
-        2.0 * (-y * e[0] + z * e[1] + w * e[2] - x * e[3]),
-        2.0 * (-z * e[0] - y * e[1] + x * e[2] + w * e[3]),
-    )
+def tilt_only(q: Any, e: Any, additive: float) -> Any:
+    """What stage 1 may change of the correction δq = e ⊗ q, as a turn from the left."""
+    if additive != 0.0:
+        d = multiply(e, q)
+        return multiply(normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3])), conjugate(q))
+    return exp((2.0 * e[1], 2.0 * e[2], 0.0))
 
 
 @inline
-def tilt_only(q: Any, d: Any, additive: float) -> Any:
-    """Quaternion corrected by what stage 1 may change."""
+def heading_only(q: Any, e: Any, additive: float) -> Any:
+    """What stage 2 may change, likewise."""
     if additive != 0.0:
-        return normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3]))
-    r = rotation_part(q, d)
-    return normalize(multiply(exp((r[0], r[1], 0.0)), q))
-
-
-@inline
-def heading_only(q: Any, d: Any, additive: float) -> Any:
-    """Quaternion corrected by what stage 2 may change."""
-    if additive != 0.0:
-        return normalize((q[0] + d[0], q[1], q[2], q[3] + d[3]))
-    r = rotation_part(q, d)
-    return normalize(multiply(exp((0.0, 0.0, r[2])), q))
+        d = multiply(e, q)
+        return multiply(normalize((q[0] + d[0], q[1], q[2], q[3] + d[3])), conjugate(q))
+    return exp((0.0, 0.0, 2.0 * e[3]))
 
 
 @inline
@@ -107,18 +96,23 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
     nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if is_sample(acc) and age_acc > 0.0:
-        motion = linear_acceleration(motion, rotate(q, acc), g, age_acc, motion_window)
+        force = rotate(q, acc)
+        motion = linear_acceleration(motion, force, g, age_acc, motion_window)
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
-        cov, d = correct_direction(cov, nothing, q, (acc[0] / g, acc[1] / g, acc[2] / g), 0.0, -1.0, r)
-        q = tilt_only(q, d, additive)
+        cov, d = correct_up(cov, nothing, (force[0] / g, force[1] / g, force[2] / g + 1.0), r)
+        turn = tilt_only(q, (d[0], d[1], d[2], d[3]), additive)
+        q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
         b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
         age_acc = 0.0
     if has_heading(down_b(q), mag) and age_mag > 0.0:
-        h = rotate(q, unit(mag))
-        u, field = field_departure((p[8], p[9], p[10]), field, rotate(q, mag), age_mag)
+        h = rotate(q, mag)
+        u, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
+        h = unit(h)
         north = math.sqrt(h[0] * h[0] + h[1] * h[1])
-        cov, d = correct_direction(cov, nothing, q, unit(mag), north, h[2], mag_var * math.exp(u) / age_mag)
-        q = heading_only(q, d, additive)
+        r = mag_var * math.exp(u) / age_mag
+        cov, d = correct_field(cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
+        turn = heading_only(q, (d[0], d[1], d[2], d[3]), additive)
+        q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
         b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
         age_mag = 0.0
     return q + b + cov + (motion, age_acc, age_mag) + field + (u,)

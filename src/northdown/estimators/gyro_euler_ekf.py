@@ -33,7 +33,7 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import attitude_covariance, correct7, quaternion_covariance
+from northdown.kernels.kalman import attitude_covariance, correct7, quaternion_covariance, relative_to
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
@@ -44,35 +44,35 @@ _NEAR_SINGULAR = int(Flag.NEAR_SINGULAR)
 
 
 @inline
-def correct_angles(cov: Any, q: Any, angles: Any, residual: Any, r: Any) -> Any:
-    """Three scalar updates with roll, pitch and yaw; returns (P, correction)."""
-    w, x, y, z = q
-    e0, e1, e2 = (-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)
+def correct_angles(p: Any, angles: Any, residual: Any, r: Any) -> Any:
+    """Three scalar updates with roll, pitch and yaw; returns (P, correction).
+
+    With δq = e ⊗ q and δ = 2 (e₁, e₂, e₃): δφ = (cos ψ δ_x + sin ψ δ_y) / cos θ, δθ = cos ψ δ_y − sin ψ δ_x,
+    δψ = δ_z + sin θ δφ.
+    """
     sp, cp = math.sin(angles[1]), math.cos(angles[1])
     sy, cy = 2.0 * math.sin(angles[2]), 2.0 * math.cos(angles[2])
-    a, b = cy / cp, sy / cp
-    roll = (
-        a * e0[0] + b * e1[0],
-        a * e0[1] + b * e1[1],
-        a * e0[2] + b * e1[2],
-        a * e0[3] + b * e1[3],
-    )
-    pitch = (
-        cy * e1[0] - sy * e0[0],
-        cy * e1[1] - sy * e0[1],
-        cy * e1[2] - sy * e0[2],
-        cy * e1[3] - sy * e0[3],
-    )
-    yaw = (
-        2.0 * e2[0] + sp * roll[0],
-        2.0 * e2[1] + sp * roll[1],
-        2.0 * e2[2] + sp * roll[2],
-        2.0 * e2[3] + sp * roll[3],
-    )
     d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    cov, d = correct7(cov, d, roll, residual[0], r[0])
-    cov, d = correct7(cov, d, pitch, residual[1], r[1])
-    return correct7(cov, d, yaw, residual[2], r[2])
+    p, d = correct_rotation(p, d, (cy / cp, sy / cp, 0.0), residual[0], r[0])
+    p, d = correct_rotation(p, d, (-sy, cy, 0.0), residual[1], r[1])
+    return correct_rotation(p, d, (sp * cy / cp, sp * sy / cp, 2.0), residual[2], r[2])
+
+
+@inline
+def correct_rotation(p: Any, d: Any, h: Any, residual: float, r: float) -> Any:
+    """Scalar update with h₀ e₁ + h₁ e₂ + h₂ e₃."""
+    a, b, c = h
+    ph = (
+        a * p[1] + b * p[2] + c * p[3],
+        a * p[7] + b * p[8] + c * p[9],
+        a * p[8] + b * p[13] + c * p[14],
+        a * p[9] + b * p[14] + c * p[18],
+        a * p[10] + b * p[15] + c * p[19],
+        a * p[11] + b * p[16] + c * p[20],
+        a * p[12] + b * p[17] + c * p[21],
+    )
+    s = a * ph[1] + b * ph[2] + c * ph[3] + r
+    return correct7(p, d, ph, s, residual - (a * d[1] + b * d[2] + c * d[3]))
 
 
 @inline
@@ -105,8 +105,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
                 euler.wrap(measured[1] - angles[1]),
                 euler.wrap(measured[2] - angles[2]),
             )
-            cov, d = correct_angles(cov, q, angles, residual, r)
-            q = normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3]))
+            cov, d = correct_angles(cov, angles, residual, r)
+            turn = normalize((1.0 + d[0], d[1], d[2], d[3]))
+            q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
         age = 0.0
     return q + (0.0, 0.0, 0.0) + cov + (motion, age, 0.0) + field + (u,)
 
@@ -115,7 +116,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 def output(p: Any, s: Any) -> Any:
     """Attitude, covariance of its rotation vector in navigation axes, field's departure u."""
     q = (s[0], s[1], s[2], s[3])
-    return q + attitude_covariance(s[7:35], q) + (s[41],)
+    return q + attitude_covariance(s[7:35]) + (s[41],)
 
 
 @inline
@@ -162,5 +163,5 @@ class GyroEulerEKF(KalmanFilter):
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         noise = self._noise()
-        covariance = quaternion_covariance(tuple(quat), noise.tilt, noise.heading, 0.0)
+        covariance = quaternion_covariance(noise.tilt, noise.heading, 0.0)
         return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)

@@ -44,8 +44,8 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct_direction
-from northdown.kernels.quaternion import dot, normalize, rotate, unit
+from northdown.kernels.kalman import correct_field, correct_up, relative_to
+from northdown.kernels.quaternion import dot, multiply, normalize, rotate, unit
 from northdown.kernels.runner import Kernel
 from northdown.kernels.weighting import field_departure, linear_acceleration
 from northdown.orientation import Flag
@@ -67,17 +67,22 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
     d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if is_sample(acc) and age_acc > 0.0:
-        motion = linear_acceleration(motion, rotate(q, acc), g, age_acc, motion_window)
+        force = rotate(q, acc)
+        motion = linear_acceleration(motion, force, g, age_acc, motion_window)
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
-        cov, d = correct_direction(cov, d, q, (acc[0] / g, acc[1] / g, acc[2] / g), 0.0, -1.0, r)
+        cov, d = correct_up(cov, d, (force[0] / g, force[1] / g, force[2] / g + 1.0), r)
         age_acc = 0.0
     if dot(mag, mag) > 0.0 and age_mag > 0.0:
-        u, field = field_departure((p[8], p[9], p[10]), field, rotate(q, mag), age_mag)
+        h = rotate(q, mag)
+        u, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
         dip = p[14] if p[14] == p[14] else field[1]
+        north, down = math.cos(dip), math.sin(dip)
+        h = unit(h)
         r = mag_var * math.exp(u) / age_mag
-        cov, d = correct_direction(cov, d, q, unit(mag), math.cos(dip), math.sin(dip), r)
+        cov, d = correct_field(cov, d, (h[0] - north, h[1], h[2] - down), north, down, r)
         age_mag = 0.0
-    q = normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3]))
+    turn = normalize((1.0 + d[0], d[1], d[2], d[3]))
+    q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
     return q + (b[0] + d[4], b[1] + d[5], b[2] + d[6]) + cov + (motion, age_acc, age_mag) + field + (u,)
 
 

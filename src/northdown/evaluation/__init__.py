@@ -1,6 +1,8 @@
-"""Compare an estimated orientation with the true one: matching in time, alignment, error metrics."""
+"""Compare an estimated orientation with the true one: matching in time, alignment, error metrics, covariances."""
 
 from northdown.evaluation.alignment import Alignment, AlignmentKind, align
+from northdown.evaluation.consistency import Coverage, NormalizedError, chi2_bounds, coverage, nees, nis
+from northdown.evaluation.consistency_runs import Conditions, ConsistencyResult, monte_carlo
 from northdown.evaluation.matching import Matched, Truth, match
 from northdown.evaluation.metrics import AttitudeError, ErrorSummary, attitude_error
 
@@ -8,10 +10,19 @@ __all__ = [
     "Alignment",
     "AlignmentKind",
     "AttitudeError",
+    "Conditions",
+    "ConsistencyResult",
+    "Coverage",
     "ErrorSummary",
     "Matched",
+    "NormalizedError",
     "Truth",
     "align",
     "attitude_error",
+    "chi2_bounds",
+    "coverage",
     "match",
+    "monte_carlo",
+    "nees",
+    "nis",
 ]

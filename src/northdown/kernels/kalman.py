@@ -3,6 +3,11 @@
 A covariance is the tuple of its upper triangle by rows. With ph = P Hᵀ for one scalar measurement of variance r and
 s = H P Hᵀ + r, the update is x + ph (y / s), P − ph phᵀ / s. Vector measurements with uncorrelated noise are taken
 one component after the other, which is the same thing and needs no matrix inverse.
+
+Covariances of size seven are those of (e, gyroscope bias), where δq = e ⊗ q is the error of the quaternion. That is a
+change of orthogonal axes only, no other state: e's scalar part lies along q, its vector part is half the rotation
+vector in navigation axes. In these axes the attitude's own turning leaves P alone, and gravity and field see one or two
+entries each.
 """
 
 from __future__ import annotations
@@ -10,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 from northdown.kernels.jit import inline
-from northdown.kernels.quaternion import multiply
+from northdown.kernels.quaternion import conjugate, multiply
 
 
 @inline
@@ -127,24 +132,13 @@ def reduce7(p: Any, h: Any, inverse_s: float) -> Any:
 
 
 @inline
-def correct7(p: Any, d: Any, h: Any, y: float, r: float) -> Any:
-    """One scalar update of a state (4 + 3) of which only the first four enter the measurement.
+def correct7(p: Any, d: Any, ph: Any, s: float, y: float) -> Any:
+    """One scalar update of a state (4 + 3) from ph = P Hᵀ, s = H P Hᵀ + r and the residual y at the point reached.
 
-    h holds the four non-zero entries of H, y the residual at the linearisation point, r its variance; d is the
-    correction gathered so far. Returns (P, d).
+    d is the correction gathered so far. Returns (P, d).
     """
-    a, b, c, e = h
-    ph = (
-        p[0] * a + p[1] * b + p[2] * c + p[3] * e,
-        p[1] * a + p[7] * b + p[8] * c + p[9] * e,
-        p[2] * a + p[8] * b + p[13] * c + p[14] * e,
-        p[3] * a + p[9] * b + p[14] * c + p[18] * e,
-        p[4] * a + p[10] * b + p[15] * c + p[19] * e,
-        p[5] * a + p[11] * b + p[16] * c + p[20] * e,
-        p[6] * a + p[12] * b + p[17] * c + p[21] * e,
-    )
-    k = 1.0 / (a * ph[0] + b * ph[1] + c * ph[2] + e * ph[3] + r)
-    g = (y - (a * d[0] + b * d[1] + c * d[2] + e * d[3])) * k
+    k = 1.0 / s
+    g = y * k
     d = (
         d[0] + g * ph[0],
         d[1] + g * ph[1],
@@ -158,69 +152,76 @@ def correct7(p: Any, d: Any, h: Any, y: float, r: float) -> Any:
 
 
 @inline
-def correct_direction(cov: Any, d: Any, q: Any, measured: Any, north: float, down: float, r: float) -> Any:
-    """Three scalar updates with the body components of (north, 0, down); returns (P, correction)."""
-    w, x, y, z = q
-    a, b = 2.0 * north, 2.0 * down
-    hx = (a * w - b * y, a * x + b * z, -a * y - b * w, -a * z + b * x)
-    hy = (-a * z + b * x, a * y + b * w, a * x + b * z, -a * w + b * y)
-    hz = (a * y + b * w, a * z - b * x, a * w - b * y, a * x + b * z)
-    # the components are homogeneous of degree two, so that each is half its derivative times q
-    ex = measured[0] - 0.5 * (hx[0] * w + hx[1] * x + hx[2] * y + hx[3] * z)
-    ey = measured[1] - 0.5 * (hy[0] * w + hy[1] * x + hy[2] * y + hy[3] * z)
-    ez = measured[2] - 0.5 * (hz[0] * w + hz[1] * x + hz[2] * y + hz[3] * z)
-    cov, d = correct7(cov, d, hx, ex, r)
-    cov, d = correct7(cov, d, hy, ey, r)
-    return correct7(cov, d, hz, ez, r)
+def correct_up(p: Any, d: Any, y: Any, r: float) -> Any:
+    """Three scalar updates with up: y is the measured less the true one in navigation axes; returns (P, correction).
+
+    Up is −(0, 0, 1), so that half of y is (e₂, −e₁, −e₀): every component sees one entry of the state.
+    """
+    r = 0.25 * r
+    p, d = correct7(p, d, (p[0], p[1], p[2], p[3], p[4], p[5], p[6]), p[0] + r, -0.5 * y[2] - d[0])
+    p, d = correct7(p, d, (p[1], p[7], p[8], p[9], p[10], p[11], p[12]), p[7] + r, -0.5 * y[1] - d[1])
+    return correct7(p, d, (p[2], p[8], p[13], p[14], p[15], p[16], p[17]), p[13] + r, 0.5 * y[0] - d[2])
 
 
 @inline
-def propagate_quaternion_bias(p: Any, q: Any, turn: Any, dt: float, q_quat: float, q_bias: float) -> Any:
-    """Covariance of (quaternion, gyroscope bias) after the step q ⊗ turn, with turn = exp((gyr − bias) Δt).
+def correct_field(p: Any, d: Any, y: Any, north: float, down: float, r: float) -> Any:
+    """Three scalar updates with the unit vector (north, 0, down), for y as in `correct_up`.
 
-    The transition is [[M, L], [0, I]]: M v = v ⊗ turn, and L e_j = −½ Δt q ⊗ (0, e_j) the derivative by the bias to
-    first order in Δt. Noise of variance q_quat is added to each component of the quaternion, q_bias to each of the
-    bias.
+    Half of y is e₀ along the vector, −e₂ along (down, 0, −north), and down e₁ − north e₃ to the east.
+    """
+    r = 0.25 * r
+    along, across = 0.5 * (north * y[0] + down * y[2]), 0.5 * (north * y[2] - down * y[0])
+    p, d = correct7(p, d, (p[0], p[1], p[2], p[3], p[4], p[5], p[6]), p[0] + r, along - d[0])
+    p, d = correct7(p, d, (p[2], p[8], p[13], p[14], p[15], p[16], p[17]), p[13] + r, across - d[2])
+    ph = (
+        down * p[1] - north * p[3],
+        down * p[7] - north * p[9],
+        down * p[8] - north * p[14],
+        down * p[9] - north * p[18],
+        down * p[10] - north * p[19],
+        down * p[11] - north * p[20],
+        down * p[12] - north * p[21],
+    )
+    return correct7(p, d, ph, down * ph[1] - north * ph[3] + r, 0.5 * y[1] - (down * d[1] - north * d[3]))
+
+
+@inline
+def propagate_quaternion_bias(p: Any, q: Any, after: Any, dt: float, q_quat: float, q_bias: float) -> Any:
+    """Covariance of (quaternion error e, gyroscope bias) after the step from q to `after` = q ⊗ exp((gyr − bias) Δt).
+
+    With δq = e ⊗ q the step leaves e as it is, but for the bias: e' = e + L b, L e_j = −½ Δt q ⊗ (0, e_j) ⊗ after*
+    the derivative by the bias to first order in Δt. Noise of variance q_quat is added to each component of e, q_bias
+    to each of the bias.
     """
     c = (p[22], p[23], p[24], p[25], p[26], p[27])
     w, x, y, z = scale4(-0.5 * dt, q)
-    l0, l1, l2 = (-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w)
-    m0 = multiply((p[4], p[10], p[15], p[19]), turn)
-    m1 = multiply((p[5], p[11], p[16], p[20]), turn)
-    m2 = multiply((p[6], p[12], p[17], p[21]), turn)
+    back = conjugate(after)
+    l0, l1, l2 = multiply((-x, w, z, -y), back), multiply((-y, -z, w, x), back), multiply((-z, y, -x, w), back)
+    m0, m1, m2 = (p[4], p[10], p[15], p[19]), (p[5], p[11], p[16], p[20]), (p[6], p[12], p[17], p[21])
     n0 = combine4(m0, l0, l1, l2, c[0], c[1], c[2])
     n1 = combine4(m1, l0, l1, l2, c[1], c[3], c[4])
     n2 = combine4(m2, l0, l1, l2, c[2], c[4], c[5])
-    a0 = multiply((p[0], p[1], p[2], p[3]), turn)
-    a1 = multiply((p[1], p[7], p[8], p[9]), turn)
-    a2 = multiply((p[2], p[8], p[13], p[14]), turn)
-    a3 = multiply((p[3], p[9], p[14], p[18]), turn)
-    # a_k is column k of M P_qq, so its rows times Mᵀ are again products by `turn`
-    b0 = multiply((a0[0], a1[0], a2[0], a3[0]), turn)
-    b1 = multiply((a0[1], a1[1], a2[1], a3[1]), turn)
-    b2 = multiply((a0[2], a1[2], a2[2], a3[2]), turn)
-    b3 = multiply((a0[3], a1[3], a2[3], a3[3]), turn)
     f = ((m0, m1, m2), (l0, l1, l2), (n0, n1, n2))
     return (
-        b0[0] + cross_term(f, 0, 0) + q_quat,
-        b0[1] + cross_term(f, 0, 1),
-        b0[2] + cross_term(f, 0, 2),
-        b0[3] + cross_term(f, 0, 3),
+        p[0] + cross_term(f, 0, 0) + q_quat,
+        p[1] + cross_term(f, 0, 1),
+        p[2] + cross_term(f, 0, 2),
+        p[3] + cross_term(f, 0, 3),
         n0[0],
         n1[0],
         n2[0],
-        b1[1] + cross_term(f, 1, 1) + q_quat,
-        b1[2] + cross_term(f, 1, 2),
-        b1[3] + cross_term(f, 1, 3),
+        p[7] + cross_term(f, 1, 1) + q_quat,
+        p[8] + cross_term(f, 1, 2),
+        p[9] + cross_term(f, 1, 3),
         n0[1],
         n1[1],
         n2[1],
-        b2[2] + cross_term(f, 2, 2) + q_quat,
-        b2[3] + cross_term(f, 2, 3),
+        p[13] + cross_term(f, 2, 2) + q_quat,
+        p[14] + cross_term(f, 2, 3),
         n0[2],
         n1[2],
         n2[2],
-        b3[3] + cross_term(f, 3, 3) + q_quat,
+        p[18] + cross_term(f, 3, 3) + q_quat,
         n0[3],
         n1[3],
         n2[3],
@@ -230,6 +231,31 @@ def propagate_quaternion_bias(p: Any, q: Any, turn: Any, dt: float, q_quat: floa
         c[3] + q_bias,
         c[4],
         c[5] + q_bias,
+    )
+
+
+@inline
+def relative_to(p: Any, turn: Any) -> Any:
+    """Covariance of (e, bias) for the attitude turn ⊗ q instead of q: e ⊗ q = (e ⊗ turn*) ⊗ (turn ⊗ q)."""
+    t = conjugate(turn)
+    m0 = multiply((p[4], p[10], p[15], p[19]), t)
+    m1 = multiply((p[5], p[11], p[16], p[20]), t)
+    m2 = multiply((p[6], p[12], p[17], p[21]), t)
+    a0 = multiply((p[0], p[1], p[2], p[3]), t)
+    a1 = multiply((p[1], p[7], p[8], p[9]), t)
+    a2 = multiply((p[2], p[8], p[13], p[14]), t)
+    a3 = multiply((p[3], p[9], p[14], p[18]), t)
+    # a_k is column k of the product from the left, so its rows times the transpose are again products by t
+    b0 = multiply((a0[0], a1[0], a2[0], a3[0]), t)
+    b1 = multiply((a0[1], a1[1], a2[1], a3[1]), t)
+    b2 = multiply((a0[2], a1[2], a2[2], a3[2]), t)
+    b3 = multiply((a0[3], a1[3], a2[3], a3[3]), t)
+    return (
+        (b0[0], b0[1], b0[2], b0[3], m0[0], m1[0], m2[0])
+        + (b1[1], b1[2], b1[3], m0[1], m1[1], m2[1])
+        + (b2[2], b2[3], m0[2], m1[2], m2[2])
+        + (b3[3], m0[3], m1[3], m2[3])
+        + p[22:]
     )
 
 
@@ -262,61 +288,18 @@ def combine4(m: Any, l0: Any, l1: Any, l2: Any, c0: float, c1: float, c2: float)
 
 
 @inline
-def attitude_covariance(p: Any, q: Any) -> Any:
-    """Covariance (6 entries) of the rotation vector δ in navigation axes, from that of the quaternion.
-
-    δq = ½ (0, δ) ⊗ q, so that δ_j = 2 ⟨(0, e_j) ⊗ q, δq⟩.
-    """
-    w, x, y, z = scale4(2.0, q)
-    e0, e1, e2 = (-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)
-    h0, h1, h2 = block4(p, e0), block4(p, e1), block4(p, e2)
-    return (dot4(e0, h0), dot4(e0, h1), dot4(e0, h2), dot4(e1, h1), dot4(e1, h2), dot4(e2, h2))
+def attitude_covariance(p: Any) -> Any:
+    """Covariance (6 entries) of the rotation vector δ in navigation axes: e = (part along q, ½ δ)."""
+    return (4.0 * p[7], 4.0 * p[8], 4.0 * p[9], 4.0 * p[13], 4.0 * p[14], 4.0 * p[18])
 
 
 @inline
-def block4(p: Any, v: Any) -> Any:
-    """Quaternion block of P times a quaternion."""
-    return (
-        p[0] * v[0] + p[1] * v[1] + p[2] * v[2] + p[3] * v[3],
-        p[1] * v[0] + p[7] * v[1] + p[8] * v[2] + p[9] * v[3],
-        p[2] * v[0] + p[8] * v[1] + p[13] * v[2] + p[14] * v[3],
-        p[3] * v[0] + p[9] * v[1] + p[14] * v[2] + p[18] * v[3],
-    )
-
-
-@inline
-def dot4(a: Any, b: Any) -> Any:
-    """Scalar product of two quaternions."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-
-
-@inline
-def quaternion_covariance(q: Any, tilt: float, heading: float, bias: float) -> Any:
+def quaternion_covariance(tilt: float, heading: float, bias: float) -> Any:
     """Upper triangle (28) of P for an attitude of given variances (rad²) about north and east, and about down.
 
-    P_qq = ¼ Σ σ_j² E_j E_jᵀ with E_j = (0, e_j) ⊗ q; the part along q is set to a hundredth of the smaller, so that
-    P is positive definite.
+    The part along q is set to a hundredth of the smaller, so that P is positive definite.
     """
-    w, x, y, z = q
-    e0, e1, e2 = (-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)
     t, h, r = 0.25 * tilt, 0.25 * heading, 0.0025 * min(tilt, heading)
-    f = (e0, e1, e2, q, t, h, r)
+    zero6, zero5, zero4 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
     zero3 = (0.0, 0.0, 0.0)
-    return (
-        (spread(f, 0, 0), spread(f, 0, 1), spread(f, 0, 2), spread(f, 0, 3))
-        + zero3
-        + (spread(f, 1, 1), spread(f, 1, 2), spread(f, 1, 3))
-        + zero3
-        + (spread(f, 2, 2), spread(f, 2, 3))
-        + zero3
-        + (spread(f, 3, 3),)
-        + zero3
-        + (bias, 0.0, 0.0, bias, 0.0, bias)
-    )
-
-
-@inline
-def spread(f: Any, i: int, j: int) -> Any:
-    """Entry (i, j) of t (E₀E₀ᵀ + E₁E₁ᵀ) + h E₂E₂ᵀ + r q qᵀ."""
-    e0, e1, e2, q, t, h, r = f
-    return t * (e0[i] * e0[j] + e1[i] * e1[j]) + h * e2[i] * e2[j] + r * q[i] * q[j]
+    return (r, *zero6, t, *zero5, t, *zero4, h, *zero3, bias, 0.0, 0.0, bias, 0.0, bias)

@@ -55,6 +55,12 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 @inline
+def conjugate(q: Quaternion) -> Quaternion:
+    """Conjugate, for unit q the inverse."""
+    return (q[0], -q[1], -q[2], -q[3])
+
+
+@inline
 def normalize(q: Quaternion) -> Quaternion:
     """Quaternion of unit norm.
 

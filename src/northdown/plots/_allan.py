@@ -82,6 +82,8 @@ def _draw_axis(ax: Axes, result: AllanResult, model: NoiseModel, k: int, factor:
     tau, deviation = result.curve.tau, factor * result.curve.deviation[:, k]
     ax.set_xscale("log")
     ax.set_yscale("log")
+    # matplotlib labels these where an axis spans little more than a decade
+    ax.tick_params(which="minor", labelsize=6.5)
     ax.fill_between(
         tau, factor * result.low[:, k], factor * result.high[:, k], color=color, alpha=0.22, linewidth=0.0
     )

@@ -1,0 +1,257 @@
+"""Hard and soft iron: truth recovered, σ honest, refusals, invariance, disturbed and unevenly spread data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cal_truth import FIELD, HARD_IRON, chi2_bounds, directions, field_recording, true_matrix
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.optimize import approx_fprime
+from scipy.spatial.transform import Rotation
+
+from northdown.calibration import calibrate_magnetometer
+from northdown.calibration._ellipsoid import curvature, ellipsoid_model, symmetric
+from northdown.errors import InputError
+from northdown.recording import Recording
+
+RNG = np.random.default_rng
+
+
+@pytest.mark.parametrize("hard", [HARD_IRON, np.zeros(3), np.array([300.0, 0.0, -150.0])])
+def test_hard_and_soft_iron_are_recovered(hard: np.ndarray) -> None:
+    part = calibrate_magnetometer(field_recording(directions(RNG(1), 1500), hard=hard)).mag
+    assert part.evidence.model == "ellipsoid"
+    assert np.abs(part.offset - hard).max() < 0.5  # µT, asked for under 0.5 µT of noise
+    assert np.abs(part.matrix - true_matrix()).max() < 0.01  # 1 %
+    assert part.evidence.after == pytest.approx(0.5, rel=0.1)  # the noise, µT
+    assert part.evidence.coverage == 1.0
+    assert not part.evidence.notes
+
+
+def test_without_noise_the_truth_is_exact() -> None:
+    part = calibrate_magnetometer(field_recording(directions(RNG(2), 300), noise=0.0)).mag
+    assert np.abs(part.offset - HARD_IRON).max() < 1e-6  # µT; rounding of 50 µT squared
+    assert np.abs(part.matrix - true_matrix()).max() < 1e-8
+
+
+def test_sigma_is_honest() -> None:
+    seeds = 60
+    offsets, matrices = [], []
+    for seed in range(seeds):
+        part = calibrate_magnetometer(field_recording(directions(RNG(seed), 300), seed=seed)).mag
+        offsets.append((part.offset - HARD_IRON) / part.offset_sigma)
+        matrices.append(((part.matrix - true_matrix()) / part.matrix_sigma)[np.triu_indices(3)])
+    low, high = chi2_bounds(3 * seeds)
+    assert low < np.mean(np.square(offsets)) < high
+    # the determinant is 1: six elements have five degrees of freedom
+    low, high = chi2_bounds(5 * seeds)
+    assert low < np.mean(np.square(matrices)) < high
+
+
+def test_sigma_of_half_a_sphere_is_honest_too() -> None:
+    """Along the axis that half a sphere tells least of, where the fit's curvature bias would show."""
+    errors = []
+    for seed in range(50):
+        unit = directions(RNG(seed), 500)
+        unit[:, 2] = np.abs(unit[:, 2])
+        part = calibrate_magnetometer(field_recording(unit, seed=seed), tolerance=0.1).mag
+        assert part.evidence.model == "ellipsoid"
+        errors.append((part.offset - HARD_IRON) / part.offset_sigma)
+    low, high = chi2_bounds(150)
+    assert low < np.mean(np.square(errors)) < high
+    assert np.abs(np.mean(errors, axis=0)).max() < 3.5 / np.sqrt(50)  # no bias: mean of unit normals
+
+
+def test_a_given_field_is_the_size_of_calibrated_samples() -> None:
+    recording = field_recording(directions(RNG(3), 1000))
+    kept = calibrate_magnetometer(recording)
+    given_field = calibrate_magnetometer(recording, field=48.0)
+    assert given_field.mag.norm == 48.0
+    assert np.linalg.norm(given_field.apply(recording).mag, axis=1).mean() == pytest.approx(48.0, abs=0.05)
+    assert np.linalg.norm(kept.apply(recording).mag, axis=1).mean() == pytest.approx(kept.mag.norm, abs=0.05)
+    assert np.linalg.det(kept.mag.matrix) == pytest.approx(1.0, abs=1e-12)
+    assert given_field.mag.matrix == pytest.approx(kept.mag.matrix * 48.0 / kept.mag.norm, rel=1e-9)
+
+
+def circle(normal: np.ndarray, height: float, n: int = 600) -> np.ndarray:
+    """Directions on the cone at that height along the normal."""
+    angle = np.linspace(0.0, 6.0 * np.pi, n)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.full(n, height / np.sqrt(1.0 - height**2))])
+    ring /= np.linalg.norm(ring, axis=1)[:, None]
+    turn, _ = Rotation.align_vectors([normal], [[0.0, 0.0, 1.0]])
+    return turn.apply(ring)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.5])
+@pytest.mark.parametrize("normal", [[1.0, 0.0, 0.0], [0.6, -0.48, 0.64]])
+@pytest.mark.parametrize("noise", [0.0, 0.5, 2.0])
+def test_planar_data_are_refused(normal: list[float], height: float, noise: float) -> None:
+    with pytest.raises(InputError, match=r"turn the sensor slowly about all three axes"):
+        calibrate_magnetometer(field_recording(circle(np.array(normal), height), noise=noise))
+
+
+def test_refusal_names_the_axis_that_is_not_known() -> None:
+    # a ring, 10° high, about y: y is told by the ring's bend alone
+    unit = directions(RNG(4), 20_000)
+    unit = unit[np.abs(unit[:, 1]) < 0.08]
+    with pytest.raises(InputError, match=r"offset along y\b"):
+        calibrate_magnetometer(field_recording(unit, noise=1.0))
+
+
+@pytest.mark.parametrize(
+    "mag",
+    [
+        np.full((500, 3), 20.0),
+        np.zeros((500, 3)),
+        np.linspace([10.0, 0.0, 0.0], [60.0, 0.0, 0.0], 500),
+        np.array([20.0, 5.0, 40.0]) + 0.5 * np.random.default_rng(5).normal(size=(2000, 3)),
+        np.repeat(FIELD * np.vstack([np.eye(3), -np.eye(3)]), 100, axis=0),
+        np.random.default_rng(6).uniform(-60.0, 60.0, (500, 3)),
+    ],
+    ids=["stuck", "zero", "line", "lying still", "six directions", "no sphere at all"],
+)
+def test_what_is_no_calibration_is_refused(mag: np.ndarray) -> None:
+    with pytest.raises(InputError, match="expected"):
+        calibrate_magnetometer(Recording(np.arange(len(mag)) * 0.01, mag=mag))
+
+
+def test_too_few_samples_are_refused_and_few_give_hard_iron_only() -> None:
+    unit = directions(RNG(7), 45)
+    with pytest.raises(InputError, match="at least 20"):
+        calibrate_magnetometer(field_recording(unit[:15]))
+    soft = np.eye(3)
+    part = calibrate_magnetometer(field_recording(unit, soft=soft)).mag
+    assert part.evidence.model == "sphere"
+    assert np.array_equal(part.matrix, np.eye(3))
+    assert "45 directions are too few for soft iron" in part.evidence.notes[0]
+    assert np.abs((part.offset - HARD_IRON) / part.offset_sigma).max() < 4.0
+
+
+def test_rotating_the_sensor_turns_the_result() -> None:
+    recording = field_recording(directions(RNG(8), 600))
+    turn = Rotation.from_rotvec([0.4, -1.0, 0.7]).as_matrix()
+    plain, turned = calibrate_magnetometer(recording).mag, calibrate_magnetometer(recording.rotate_body(turn)).mag
+    assert turned.offset == pytest.approx(turn @ plain.offset, abs=1e-6)  # µT; where the iteration ends
+    assert turned.matrix == pytest.approx(turn @ plain.matrix @ turn.T, abs=1e-8)
+    assert turned.norm == pytest.approx(plain.norm, rel=1e-8)
+
+
+def test_order_and_unit_of_the_samples_do_not_matter() -> None:
+    recording = field_recording(directions(RNG(9), 400))
+    plain = calibrate_magnetometer(recording).mag
+    mixed = Recording(recording.time, mag=recording.mag[RNG(1).permutation(400)])
+    assert calibrate_magnetometer(mixed).mag.offset == pytest.approx(plain.offset, abs=1e-6)  # µT
+    gauss = Recording(recording.time, mag=recording.mag / 100.0, mag_unit="arbitrary")
+    part = calibrate_magnetometer(gauss).mag
+    assert part.unit == "arbitrary"
+    assert part.offset == pytest.approx(plain.offset / 100.0, abs=1e-8)
+    assert part.matrix == pytest.approx(plain.matrix, abs=1e-8)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_a_disturbed_stretch_does_not_matter(share: float) -> None:
+    recording = field_recording(directions(RNG(10), 1000))
+    mag = np.array(recording.mag)
+    mag[100 : 100 + int(1000 * share)] += [40.0, 10.0, -30.0]  # past a magnet, µT
+    part = calibrate_magnetometer(Recording(recording.time, mag=mag)).mag
+    assert np.abs(part.offset - HARD_IRON).max() < 0.5  # µT
+    assert np.abs(part.matrix - true_matrix()).max() < 0.01
+    assert part.evidence.used == pytest.approx(1.0 - share, abs=0.05)
+    assert any("left out as disturbed" in note for note in part.evidence.notes)
+
+
+def test_more_disturbed_than_not_is_refused() -> None:
+    recording = field_recording(directions(RNG(11), 1000))
+    mag = np.array(recording.mag)
+    mag[:700] += RNG(2).normal(0.0, 40.0, (700, 3))
+    with pytest.raises(InputError, match="expected"):
+        calibrate_magnetometer(Recording(recording.time, mag=mag))
+
+
+def test_lying_still_does_not_outvote_turning() -> None:
+    recording = field_recording(directions(RNG(12), 500))
+    lying = np.array([80.0, 0.0, 0.0]) + 0.3 * RNG(3).normal(size=(20_000, 3))  # on a steel table, µT
+    both = Recording(np.arange(20_500) * 0.01, mag=np.vstack([lying, recording.mag]))
+    part = calibrate_magnetometer(both).mag
+    assert np.abs(part.offset - HARD_IRON).max() < 0.5  # µT
+    assert part.evidence.samples < 2000
+
+
+def test_several_recordings_and_missing_samples() -> None:
+    recording = field_recording(directions(RNG(13), 800))
+    mag = np.array(recording.mag)
+    mag[::3] = np.nan
+    holes = Recording(recording.time, mag=mag)
+    there = Recording(recording.time[~np.isnan(mag[:, 0])], mag=mag[~np.isnan(mag[:, 0])])
+    one = calibrate_magnetometer(holes).mag
+    assert np.array_equal(one.offset, calibrate_magnetometer(there).mag.offset)
+    parts = [holes[:300], holes[300:]]
+    assert calibrate_magnetometer(parts).mag.offset == pytest.approx(one.offset, abs=1e-6)
+
+
+def test_an_uneven_field_enlarges_the_sigma() -> None:
+    """Errors that stay from one direction to the next do not average out, however many samples there are."""
+    angle = np.linspace(0.0, 40.0 * np.pi, 6000)
+    height = np.cos(np.linspace(0.05, np.pi - 0.05, 6000))
+    radius = np.sqrt(1.0 - height**2)
+    unit = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    # the first part shows in the residuals; the second is as large, but looks like hard iron
+    uneven = 1.0 + 0.09 * unit[:, 0] * unit[:, 1] * unit[:, 2] + 0.015 * unit[:, 2]
+    mag = FIELD * unit * uneven[:, None] + 0.1 * RNG(4).normal(size=unit.shape)
+    even = calibrate_magnetometer(field_recording(unit, noise=0.1, hard=np.zeros(3), soft=np.eye(3))).mag
+    part = calibrate_magnetometer(Recording(np.arange(6000) * 0.01, mag=mag)).mag
+    assert part.offset_sigma.min() > 10.0 * even.offset_sigma.max()
+    # the field itself moves the offset by 0.75 µT: this must be within what the σ allows
+    assert abs(part.offset[2]) > 0.5
+    assert abs(part.offset[2]) < 5.0 * part.offset_sigma[2]
+
+
+def test_derivatives_of_the_distance() -> None:
+    rng = RNG(14)
+    points = 1.3 * directions(rng, 6) + 0.1
+    x = np.concatenate([rng.normal(0.0, 0.1, 3), [1.1, 0.9, 1.0, 0.05, -0.04, 0.08]])
+    model = ellipsoid_model(points)
+    numeric = approx_fprime(x, lambda v: model(v)[0], 1e-7)
+    assert model(x)[1] == pytest.approx(numeric, abs=1e-5)  # forward differences
+
+
+def test_mean_curvature_of_known_surfaces() -> None:
+    sphere = curvature(4.0 * directions(RNG(15), 5), np.zeros(3), np.eye(3) / 4.0)
+    assert sphere == pytest.approx(np.full(5, 0.25), rel=1e-12)
+    # at the tip of an ellipsoid with semi-axes a, b, c both curvatures are c/a² and c/b²
+    a, b, c = 2.0, 3.0, 5.0
+    tip = curvature(np.array([[0.0, 0.0, c]]), np.zeros(3), symmetric(np.array([1 / a, 1 / b, 1 / c, 0, 0, 0])))
+    assert tip[0] == pytest.approx(0.5 * (c / a**2 + c / b**2), rel=1e-12)
+
+
+def test_wrong_arguments() -> None:
+    recording = field_recording(directions(RNG(16), 100))
+    with pytest.raises(InputError, match="field above 0"):
+        calibrate_magnetometer(recording, field=0.0)
+    with pytest.raises(InputError, match="tolerance"):
+        calibrate_magnetometer(recording, tolerance=float("nan"))
+    with pytest.raises(InputError, match="samples of the magnetometer"):
+        calibrate_magnetometer(Recording(recording.time, gyr=recording.mag))
+    with pytest.raises(InputError, match="at least one recording"):
+        calibrate_magnetometer([])
+    with pytest.raises(InputError, match="one unit"):
+        calibrate_magnetometer([recording, Recording(recording.time, mag=recording.mag, mag_unit="arbitrary")])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    arrays(
+        np.float64,
+        st.tuples(st.integers(0, 80), st.just(3)),
+        elements=st.floats(-1e12, 1e12) | st.just(np.nan) | st.sampled_from([0.0, 1.0, 1e-300]),
+    )
+)
+def test_hostile_arrays_are_refused_or_calibrated(mag: np.ndarray) -> None:
+    try:
+        part = calibrate_magnetometer(Recording(np.arange(len(mag)) * 0.01, mag=mag)).mag
+    except InputError:
+        return
+    assert np.isfinite(part.offset).all()
+    assert np.isfinite(part.matrix).all()
