@@ -36,7 +36,7 @@ def test_command_lines(tmp_path):
 
 def test_python(tmp_path):
     program = "\n".join(blocks("python"))
-    assert "RMSE" in run([sys.executable, "-W", "error", "-c", program], tmp_path).upper()
+    assert "inclination" in run([sys.executable, "-W", "error", "-c", program], tmp_path)
 
 
 def test_make_targets_exist_and_console_lines_are_those_of_ci():

@@ -17,6 +17,7 @@ from northdown.cli import console
 from northdown.cli.allan import allan
 from northdown.cli.calibrate import calibrate
 from northdown.cli.compare import compare
+from northdown.cli.consistency import consistency
 from northdown.cli.demo import demo
 from northdown.cli.estimate import estimate
 from northdown.cli.estimators import estimators
@@ -79,7 +80,7 @@ def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _command in (info, estimate, compare, estimators, calibrate, allan, simulate, demo):
+for _command in (info, estimate, compare, consistency, estimators, calibrate, allan, simulate, demo):
     app.command(_command.__name__)(_stoppable(_command))
 
 

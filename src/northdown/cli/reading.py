@@ -54,6 +54,9 @@ class Reading:
         str | None,
         typer.Option(metavar="NED|ENU|NWU", help="Navigation frame of the result; the file's own when not given."),
     ] = None
+    calibration: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Correct the sensors first, with what 'calibrate' wrote.")
+    ] = None
     remap: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="New axes in terms of the old, such as y,-x,z.")
     ] = None
@@ -92,6 +95,10 @@ class Reading:
             recording = replace(recording, reference_offset=offset)
         if self.sort:
             recording = recording.sort()
+        if self.calibration is not None:
+            import northdown.calibration
+
+            recording = northdown.calibration.load(self.calibration).apply(recording)
         if self.remap is not None:
             recording = recording.remap(self.remap)
         return self._cut(recording)
