@@ -223,7 +223,10 @@ def test_adaptive_and_fuzzy_gain():
     acc = rest.acc.copy()
     acc[100:200, 0] = 8.0
     shoved = dataclasses.replace(rest, acc=acc)
-    tilt = {k: np.abs(nd.Complementary(tau_acc=1.0, gain=k).run(shoved).as_euler()[:, 1]).max() for k in ("fixed", "adaptive")}
+    tilt = {
+        k: np.abs(nd.Complementary(tau_acc=1.0, gain=k).run(shoved).as_euler()[:, 1]).max()
+        for k in ("fixed", "adaptive")
+    }
     assert tilt["fixed"] > math.radians(20)
     assert tilt["adaptive"] < math.radians(0.01)
 

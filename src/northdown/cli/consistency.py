@@ -1,4 +1,4 @@
-"""``northdown consistency``: is a filter's covariance to be believed?"""
+"""``northdown consistency``: whether a filter's covariance is to be believed."""
 
 from __future__ import annotations
 
@@ -77,22 +77,21 @@ def consistency(
     values = read_assignments(chosen, parameter)
     if plot is not None:
         check_target("--plot", plot, source=reading.source or "-", suffixes=FIGURE_SUFFIXES)
+    found: ConsistencyResult | NormalizedError
     if reading.source == _NO_RECORDING:
         if reading != Reading(source=_NO_RECORDING) or force or max_gap != gate.MAX_GAP_TEXT:
             raise InputError(expected("a recording with the options for reading one", "none", do="name a file first"))
         found = _simulated(chosen, values, runs, seed)
-        body = simulation_as_dict(found)
     else:
         if runs is not None or seed is not None:
             raise InputError(expected("either a recording, or --runs and --seed", "both"))
         found = _recorded(reading, chosen(**values), gate.read_max_gap(max_gap), force)
-        body = recording_as_dict(found)
     if plot is not None:
         from northdown import plots
 
         plots.save(plots.consistency(found), plot)
     if json:
-        console.write_json(body)
+        console.write_json(as_dict(found))
         return
     _show(found)
     if plot is not None:
@@ -175,12 +174,8 @@ def _facts(found: ConsistencyResult) -> list[tuple[str, str]]:
     ]
     if found.bias is not None and found.bias_bounds is not None:
         axes = ", ".join(f"{v:.2f}" for v in found.bias)
-        rows.append(
-            (
-                "Bias",
-                f"(error/sigma)² of x, y, z: {axes} ({found.bias_bounds[0]:.2f} to {found.bias_bounds[1]:.2f} is right)",
-            )
-        )
+        low, high = found.bias_bounds
+        rows.append(("Bias", f"(error/sigma)² of x, y, z: {axes} ({low:.2f} to {high:.2f} is right)"))
     return rows
 
 
@@ -200,8 +195,14 @@ def _axis_table(frame: Any, share: FloatArray, rms_error: FloatArray, rms_sigma:
     console.table(("", "RMS error °", "RMS sigma °", "% in 1σ", "% in 2σ", "% in 3σ"), rows)
 
 
-def simulation_as_dict(found: ConsistencyResult) -> dict[str, Any]:
-    """The figures of simulated runs for programs; angles in degrees."""
+def as_dict(found: ConsistencyResult | NormalizedError) -> dict[str, Any]:
+    """The figures for programs; angles in degrees."""
+    from northdown.evaluation import ConsistencyResult
+
+    return _simulation_as_dict(found) if isinstance(found, ConsistencyResult) else _recording_as_dict(found)
+
+
+def _simulation_as_dict(found: ConsistencyResult) -> dict[str, Any]:
     return {
         "estimator": found.name,
         "runs": found.runs,
@@ -220,8 +221,7 @@ def simulation_as_dict(found: ConsistencyResult) -> dict[str, Any]:
     }
 
 
-def recording_as_dict(found: NormalizedError) -> dict[str, Any]:
-    """The figures of a recording for programs; angles in degrees."""
+def _recording_as_dict(found: NormalizedError) -> dict[str, Any]:
     from northdown.evaluation import coverage
 
     what = coverage(found)
