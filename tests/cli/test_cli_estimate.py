@@ -36,7 +36,9 @@ def test_summary_agrees_with_scipy(run, recording, csv):
     yaw, pitch, roll = found[-1].as_euler("ZYX", degrees=True)
     # two digits are shown
     np.testing.assert_allclose(numbers(result.out, "At the end"), [roll, pitch, yaw], atol=0.0051)
-    np.testing.assert_allclose(numbers(result.out, "Gyro bias"), np.rad2deg(orientation.gyr_bias[-1]), atol=0.00051)
+    bias, sigma = np.rad2deg(orientation.gyr_bias[-1]), np.rad2deg(orientation.gyr_bias_sigma[-1])
+    shown = numbers(result.out, "Gyro bias")
+    np.testing.assert_allclose(shown, np.column_stack([bias, sigma]).ravel(), atol=0.00051)
     error = (found * recording.reference.rotation.inv())[recording.movement]
     total = np.degrees(np.sqrt(np.mean(error.magnitude() ** 2)))
     assert numbers(result.out, "RMS error")[0] == pytest.approx(total, abs=0.0051)
@@ -132,7 +134,7 @@ def test_columns_and_rate_of_a_bare_table(run, recording, tmp_path):
     options += ["--unit", "gyr=deg/s", "--rate", "50"]
     quat = table(run("estimate", path, *options, "-o", "-").out)[["qw", "qx", "qy", "qz"]]
     # 18 digits are written, degrees cost the last bit
-    np.testing.assert_allclose(quat, nd.Mahony().run(recording).quat, atol=1e-10)
+    np.testing.assert_allclose(quat, nd.estimators.get(DEFAULT_ESTIMATOR)().run(recording).quat, atol=1e-10)
     without = run("estimate", path, *options, "--columns", "mag=")
     assert "one --columns for mag" in without.error
 
@@ -140,7 +142,9 @@ def test_columns_and_rate_of_a_bare_table(run, recording, tmp_path):
 def test_sensor_left_out(run, recording, csv):
     result = run("estimate", csv, "--columns", "mag=", "-o", "-")
     bare = nd.Recording(recording.time, recording.gyr, recording.acc)
-    np.testing.assert_array_equal(table(result.out)[["qw", "qx", "qy", "qz"]], nd.Mahony().run(bare).quat)
+    np.testing.assert_array_equal(
+        table(result.out)[["qw", "qx", "qy", "qz"]], nd.estimators.get(DEFAULT_ESTIMATOR)().run(bare).quat
+    )
 
 
 def test_standard_input(csv, recording):
@@ -149,6 +153,7 @@ def test_standard_input(csv, recording):
         result = subprocess.run(command, stdin=stream, capture_output=True, timeout=120)
     assert result.returncode == 0
     np.testing.assert_array_equal(
-        table(result.stdout.decode())[["qw", "qx", "qy", "qz"]], nd.Mahony().run(recording).quat
+        table(result.stdout.decode())[["qw", "qx", "qy", "qz"]],
+        nd.estimators.get(DEFAULT_ESTIMATOR)().run(recording).quat,
     )
     assert result.stderr.decode().startswith("Recording   walk, 601 samples")
