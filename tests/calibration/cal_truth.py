@@ -99,7 +99,7 @@ def turns_recording(
 def turning_recording(
     *,
     seed: int = 0,
-    duration: float = 60.0,
+    duration: float = 40.0,
     rate: float = 100.0,
     mag_noise: float = 0.3,
     misaligned: Rotation | None = None,

@@ -8,6 +8,8 @@ from cal_truth import FIELD, chi2_bounds, turning_recording
 from scipy.spatial.transform import Rotation
 
 from northdown.calibration import align_magnetometer, local_field, magnetometer_lag
+from northdown.calibration._field_pairs import gather_pairs
+from northdown.calibration.alignment import _DipResiduals, _GyrResiduals
 from northdown.errors import InputError
 from northdown.recording import Recording
 
@@ -110,3 +112,38 @@ def test_local_field() -> None:
     dip = np.deg2rad(65.0)
     assert field.vector("NED") == pytest.approx(FIELD * np.array([np.cos(dip), 0.0, np.sin(dip)]), abs=0.2)
     assert field.vector("ENU") == pytest.approx(FIELD * np.array([0.0, np.cos(dip), -np.sin(dip)]), abs=0.2)
+
+
+def test_horizontal_acceleration_does_not_change_the_dip() -> None:
+    """It hardly changes the size of specific force, only its direction."""
+    recording = turning_recording(axes=0.2 * np.ones(3))
+    level = local_field(recording)
+    acc = np.array(recording.acc)
+    second = slice(len(acc) // 2, None)
+    # 0.15 g across, at 2 Hz
+    across = np.cross(acc[second], [0.3, -0.5, 0.8])
+    across *= (
+        0.15 * 9.81 * np.sin(4.0 * np.pi * recording.time[second])[:, None] / np.linalg.norm(across, axis=1)[:, None]
+    )
+    acc[second] += across
+    shaken = local_field(Recording(recording.time, gyr=recording.gyr, acc=acc, mag=recording.mag))
+    assert shaken.dip == pytest.approx(level.dip, abs=0.003)  # rad
+    assert shaken.samples < 0.75 * level.samples
+
+
+def test_derivatives_of_the_residuals() -> None:
+    recording = turning_recording(duration=20.0, mag_noise=0.0)
+    pairs = gather_pairs([recording])
+    up = recording.acc[::100] / np.linalg.norm(recording.acc[::100], axis=1)[:, None]
+    field = recording.mag[::100] / FIELD
+    for residuals, unknowns in ((_GyrResiduals(pairs), np.zeros(4)), (_DipResiduals(up, field), np.array([0.1]))):
+        jacobian = residuals(np.eye(3), unknowns)[1]
+        for k in range(jacobian.shape[1]):
+            step = np.zeros(jacobian.shape[1])
+            step[k] = 1e-5
+            plus, minus = (
+                residuals(Rotation.from_rotvec(s * step[:3]).as_matrix(), unknowns + s * step[3:])[0]
+                for s in (1.0, -1.0)
+            )
+            # without noise the second field is where the gyroscope says, but for its own noise
+            assert jacobian[:, k] == pytest.approx((plus - minus) / 2e-5, abs=2e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -86,13 +87,24 @@ def test_json_and_several_recordings(run: Run, folder: Path) -> None:
 def test_one_after_the_other(run: Run, folder: Path, tmp_path: Path) -> None:
     cal = tmp_path / "cal.json"
     assert run("acc", folder / "acc.csv", "-o", cal)[0] == 0
-    assert run("mag", folder / "all.csv", "--turn-to", "gyr", "--after", cal, "-o", cal)[0] == 0
+    assert run("mag", folder / "all.csv", "--turn-to", "gyr", "--calibration", cal, "-o", cal)[0] == 0
     whole = load(cal)
     assert [part.sensor for part in whole.parts] == ["acc", "mag"]
     assert whole.mag.evidence.model == "ellipsoid, then alignment by gyroscope"
     truth = Rotation.from_rotvec([0.05, 0.0, 0.02])
     u, _, v = np.linalg.svd(whole.mag.matrix)
     assert (Rotation.from_matrix(u @ v) * truth.inv()).magnitude() < 0.02  # rad
+
+
+def test_what_was_found_serves_to_estimate(run: Run, folder: Path, tmp_path: Path) -> None:
+    cal, raw = tmp_path / "cal.toml", nd.read(folder / "all.csv")
+    nd.write_recording(dataclasses.replace(raw, mag=raw.mag + HARD_IRON), tmp_path / "iron.csv")
+    assert run("acc", folder / "acc.csv", "-o", cal)[0] == 0
+    # the accelerometer's calibration has nothing to correct in a recording of the field alone, and is kept
+    assert run("mag", folder / "mag.csv", "--calibration", cal, "-o", tmp_path / "both.toml")[0] == 0
+    assert [part.sensor for part in load(tmp_path / "both.toml").parts] == ["acc", "mag"]
+    assert run("mag", tmp_path / "iron.csv", "-o", tmp_path / "mag.toml")[0] == 0
+    assert main(["estimate", str(tmp_path / "iron.csv"), "--calibration", str(tmp_path / "mag.toml")]) == 0
 
 
 def test_refusals_are_one_line(run: Run, folder: Path, tmp_path: Path) -> None:
@@ -107,9 +119,10 @@ def test_refusals_are_one_line(run: Run, folder: Path, tmp_path: Path) -> None:
         (("mag", mag, "--field", "much"), "a number of µT for --field"),
         (("mag", mag, "--tolerance", "2"), "--tolerance between"),
         (("mag", mag, mag), "each recording once"),
+        (("mag", mag, "--remap", "y,-x,z"), "the sensor's own axes"),
         (("mag", mag, "-o", tmp_path / "cal.csv"), "--output to end in .toml, .json"),
         (("mag", mag, "-o", tmp_path / "none" / "cal.toml"), "a folder that exists"),
-        (("mag", mag, "--after", mag), "a calibration in TOML or JSON"),
+        (("mag", mag, "--calibration", mag), "a calibration in TOML or JSON"),
     ]:
         code, out, err = run(*arguments)
         assert (code, out) == (2, "")

@@ -11,8 +11,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from northdown.calibration import calibrate_gyroscope
+from northdown.calibration._turn_data import gather_turns
 from northdown.calibration.rest import find_rests
-from northdown.calibration.turns import turn_errors
+from northdown.calibration.turns import _lowers, _tangents, turn_errors
 from northdown.errors import InputError
 from northdown.kernels.turn import turns
 from northdown.recording import Recording
@@ -180,3 +181,29 @@ def test_hostile_arrays_are_refused_or_calibrated(samples: np.ndarray, step: flo
         except InputError:
             continue
         assert np.isfinite(part.offset).all()
+
+
+def test_turns_that_share_a_rest_share_its_noise() -> None:
+    """The covariance of residuals is what moving each rest's direction does to the turns on both sides."""
+    recording = turns_recording(directions(RNG(9), 5))
+    found = gather_turns([(recording, find_rests(recording))])
+    ((_, lower),) = _lowers(found, np.eye(3))
+    rotation, _ = found.integrate(np.eye(3))
+    frames = _tangents(found.after)
+
+    def residuals(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        away = np.einsum("tji,tj->ti", rotation, before) - after
+        return np.einsum("tai,ti->ta", frames, away).ravel()
+
+    covariance = np.kron(np.diag(found.own_variance), np.eye(2))
+    start = residuals(found.before, found.after)
+    for rest in range(6):
+        for axis in np.eye(3):
+            before, after = found.before.copy(), found.after.copy()
+            before[found.rest[:, 0] == rest] += 1e-3 * axis
+            after[found.rest[:, 1] == rest] += 1e-3 * axis
+            moved = (residuals(before, after) - start) / 1e-3
+            covariance += found.rest_variance[rest] * np.outer(moved, moved)
+    # The difference is noise along the direction itself, of which a gyroscope that errs by 1° carries 2 % over.
+    assert lower @ lower.T == pytest.approx(covariance, abs=0.03 * covariance.max())
+    assert np.abs(covariance[:2, 2:4]).max() > 0.1 * covariance.max()

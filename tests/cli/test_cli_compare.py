@@ -60,7 +60,7 @@ def test_without_reference_it_compares_with_the_first(run, recording, tmp_path):
     _, _, z, w = between[-1].as_quat()
     assert second["end_heading_deg"] == pytest.approx(np.degrees(2.0 * np.arctan(z / w)), rel=1e-9)
     text = run("compare", path)
-    assert "no reference, so RMS differences from mahony" in text.out
+    assert "no reference, so RMS differences from mekf" in text.out
     assert "end heading" in text.out
     assert max(map(len, text.out.splitlines())) <= 80
 

@@ -28,7 +28,7 @@ from northdown.recording import Recording
 
 # Successive samples within this angle (rad) of each other become one point: lying still must not outvote turning,
 # and a mean over 2° falls short of the sphere by 0.01 % only.
-_RUN: Final = math.radians(1e-6)
+_RUN: Final = math.radians(2.0)
 HOW: Final = "turn the sensor slowly about all three axes, away from iron, and calibrate again"
 FEWEST_SPHERE: Final = 20
 FEWEST_ELLIPSOID: Final = 50

@@ -40,10 +40,6 @@ def calibrate(
     output: Annotated[
         str | None, typer.Option("--output", "-o", metavar="FILE", help="Write the calibration: .toml or .json.")
     ] = None,
-    after: Annotated[
-        str | None,
-        typer.Option("--after", metavar="FILE", help="Apply this calibration first, and write both together."),
-    ] = None,
     field: Annotated[
         str | None,
         typer.Option("--field", metavar="UT", help="mag: local field in µT; kept as it is when not given."),
@@ -70,7 +66,7 @@ def calibrate(
     """Find a sensor's offset, scale and alignment from recordings.
 
     mag: turned slowly about all axes. acc: at rest in nine positions or more. gyr: at rest; with turns between rests
-    also scale and alignment.
+    also scale and alignment. What --calibration names is applied first, and written together with what is found.
     """
     from northdown._validation import check_choice
 
@@ -88,12 +84,14 @@ def calibrate(
     sources = [*(more or []), reading.source]
     _check_targets(output, plot, sources)
     numbers = _numbers(field, gravity, tolerance)
-    recordings = [dataclasses.replace(reading, source=source).load() for source in sources]
+    if reading.remap is not None:
+        raise InputError(expected("the sensor's own axes", f"--remap {reading.remap}", do="leave it out here"))
+    first = _load(reading.calibration)
+    recordings = [dataclasses.replace(reading, source=source, calibration=None).load() for source in sources]
     for recording in recordings:
         _admit(recording, sensor, force=force)
-    first = _load(after)
     if first is not None:
-        recordings = [first.apply(recording) for recording in recordings]
+        recordings = [_corrected(first, recording) for recording in recordings]
     steps = _find(sensor, recordings, turn_to, numbers)
     found = functools.reduce(lambda one, other: one.then(other), steps)
     whole = found if first is None else first.then(found)
@@ -145,6 +143,13 @@ def _load(path: str | None) -> Calibration | None:
     from northdown.calibration import load
 
     return load(path)
+
+
+def _corrected(first: Calibration, recording: Recording) -> Recording:
+    """Apply a calibration that may be of other sensors only."""
+    if any(getattr(recording, part.sensor) is not None for part in first.parts):
+        return first.apply(recording)
+    return recording
 
 
 def _find(
