@@ -1,8 +1,10 @@
 """Compare an estimated orientation with the true one: matching in time, alignment, error metrics, covariances."""
 
 from northdown.evaluation.alignment import Alignment, AlignmentKind, align
-from northdown.evaluation.consistency import Coverage, NormalizedError, chi2_bounds, coverage, nees, nis
-from northdown.evaluation.consistency_runs import Conditions, ConsistencyResult, monte_carlo
+from northdown.evaluation.chi_square import chi2_bounds, nis
+from northdown.evaluation.consistency import Coverage, NormalizedError, coverage, nees
+from northdown.evaluation.consistency_conditions import Conditions
+from northdown.evaluation.consistency_runs import ConsistencyResult, monte_carlo
 from northdown.evaluation.matching import Matched, Truth, match
 from northdown.evaluation.metrics import AttitudeError, ErrorSummary, attitude_error
 

@@ -5,10 +5,11 @@ notebook by naming it, or write it with `save`. Angles in degrees unless asked o
 """
 
 from northdown.plots._allan import allan
+from northdown.plots._consistency import consistency
 from northdown.plots._errors import errors
 from northdown.plots._euler import euler
 from northdown.plots._quaternion import quaternion
 from northdown.plots._save import save
 from northdown.plots._sensors import sensors
 
-__all__ = ["allan", "errors", "euler", "quaternion", "save", "sensors"]
+__all__ = ["allan", "consistency", "errors", "euler", "quaternion", "save", "sensors"]

@@ -8,10 +8,10 @@ import numpy as np
 
 from northdown._validation import FloatArray
 from northdown.errors import InputError, expected
-from northdown.evaluation.consistency import DEGREES_OF_FREEDOM, NormalizedError, chi2_bounds
+from northdown.evaluation.chi_square import chi2_bounds
+from northdown.evaluation.consistency import AXIS_NAMES, DEGREES_OF_FREEDOM, NormalizedError
 from northdown.evaluation.consistency_runs import ConsistencyResult
 from northdown.evaluation.matching import longest_gap
-from northdown.frames import AXIS_NAMES
 from northdown.plots._canvas import (
     STYLES,
     Clock,
