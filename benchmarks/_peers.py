@@ -57,6 +57,19 @@ def batch(recording: nd.Recording) -> dict[str, tuple[int, Call] | None]:
     return cases
 
 
+def kalman(recording: nd.Recording) -> dict[str, tuple[int, Call] | None]:
+    """Kalman filters of ahrs, four states each and without bias, over a few samples; its UKF leaves the field out."""
+    ahrs, rate, few = find("ahrs"), recording.rate, min(len(recording), 200)
+    if ahrs is None:
+        return {"ahrs.filters.EKF": None, "ahrs.filters.UKF": None}
+    filters = import_module("ahrs.filters")
+    gyr, acc, mag = (x[:few].copy() for x in (recording.gyr, recording.acc, recording.mag))
+    return {
+        "ahrs.filters.EKF": (few, lambda: filters.EKF(gyr=gyr, acc=acc, mag=mag, frequency=rate)),
+        "ahrs.filters.UKF": (few, lambda: filters.UKF(gyr=gyr, acc=acc, frequency=rate)),
+    }
+
+
 def stream(recording: nd.Recording) -> dict[str, Call | None]:
     """Live samples one by one: a call that loops over the recording's samples; None where the peer is missing."""
     period = 1.0 / recording.rate

@@ -139,6 +139,38 @@ def bench_estimators(recording: nd.Recording, rounds: int) -> None:
     console.print(shown)
 
 
+def bench_kalman(recording: nd.Recording, rounds: int) -> None:
+    """Kalman filters' public run beside VQF and the Kalman filters of ahrs, which are written in Python."""
+    part = recording[:20_000]
+    names = ("mekf", "quaternion-ekf", "double-stage-ekf", "euler-ukf")
+    cases: dict[str, tuple[int, Callable[[], object]]] = {
+        name: (len(part), lambda name=name: nd.estimators.get(name)().run(part)) for name in names
+    }
+    peers = {"vqf.VQF": _peers.batch(part)["vqf.VQF"], **_peers.kalman(part)}
+    cases |= {name: case for name, case in peers.items() if case is not None}
+    times = _timing.take_turns({k: call for k, (_, call) in cases.items()}, rounds)
+    per_sample = {k: times[k] / count for k, (count, _) in cases.items()}
+    shown = table(f"Kalman filters over {len(part)} samples, ns/sample", "", "best", "median", "÷ vqf.VQF")
+    for name, t in per_sample.items():
+        to_peer = f"{_timing.ratio(t, per_sample['vqf.VQF']):.2f}" if "vqf.VQF" in per_sample else "–"
+        shown.add_row(name, f"{t.min() * 1e9:.0f}", f"{np.median(t) * 1e9:.0f}", to_peer)
+        results.setdefault("kalman", {})[name] = float(np.median(t) * 1e9)
+    for name, case in peers.items():
+        if case is None:
+            shown.add_row(name, _peers.INSTALL, "", "")
+    console.print(shown)
+    for name in names[1:3]:
+        if "vqf.VQF" in per_sample:
+            verdict(f"{name}'s time ÷ vqf.VQF's", _timing.ratio(per_sample[name], per_sample["vqf.VQF"]), 0.5)
+        if "ahrs.filters.EKF" in per_sample:
+            slower = _timing.ratio(per_sample["ahrs.filters.EKF"], per_sample[name])
+            verdict(f"ahrs EKF's time ÷ {name}'s", slower, 700.0, at_least=True)
+    verdict("euler-ukf", float(np.median(per_sample["euler-ukf"]) * 1e6), 4.0, unit=" µs")
+    if "ahrs.filters.UKF" in per_sample:
+        slower = _timing.ratio(per_sample["ahrs.filters.UKF"], per_sample["euler-ukf"])
+        verdict("ahrs UKF's time ÷ euler-ukf's", slower, 150.0, at_least=True)
+
+
 def bench_stream(recording: nd.Recording, rounds: int) -> None:
     """One sample per call from Python."""
     part = recording[:STREAMED]
@@ -247,6 +279,7 @@ def main() -> None:
     bench_batch(recording, rounds)
     bench_stream(recording, rounds)
     bench_estimators(recording, rounds)
+    bench_kalman(recording, rounds)
     bench_start(repeats)
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:

@@ -171,7 +171,11 @@ def dense_quaternion_ekf(f, recording, q):
             K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(r))
             d = K @ np.concatenate(z)
             P = (np.eye(7) - K @ H) @ P
-            q, b = (q + d[:4]) / np.linalg.norm(q + d[:4]), b + d[4:]
+            old, q, b = q, (q + d[:4]) / np.linalg.norm(q + d[:4]), b + d[4:]
+            # the error from the left, e in (1 + e) q, keeps its covariance while q moves
+            moved = product(old * [1.0, -1.0, -1.0, -1.0], q)
+            M = block_diag(np.array([product(unit, moved) for unit in np.eye(4)]).T, np.eye(3))
+            P = M @ P @ M.T
     E = rotation_basis(q)
     return q, b, E @ P[:4, :4] @ E.T, np.sqrt(np.diag(P)[4:])
 

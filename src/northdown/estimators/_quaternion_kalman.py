@@ -1,7 +1,7 @@
 """What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
 
-State tuple: quaternion 4, bias 3, P 28 (of (e, bias) with δq = e ⊗ q, see `kernels.kalman`), mean square of linear acceleration, ages of acc and mag, field's norm, dip
-and age, departure u of the last field sample.
+State tuple: quaternion 4, bias 3, P 28 (of (e, bias) with δq = e ⊗ q, see `kernels.quaternion_kalman`), mean square
+of linear acceleration, ages of acc and mag, field's norm, dip and age, departure u of the last field sample.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from northdown._validation import FloatArray
 from northdown.estimators._kalman import BiasKalmanFilter
 from northdown.frames import Frame
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import attitude_covariance, propagate_quaternion_bias, quaternion_covariance
 from northdown.kernels.quaternion import dot, multiply, normalize
+from northdown.kernels.quaternion_kalman import attitude_covariance, propagate_quaternion_bias, quaternion_covariance
 from northdown.kernels.so3 import exp
 from northdown.kernels.weighting import REJECTED
 from northdown.orientation import Flag
 
 N_STATE = 42
-N_OUT = 17
+N_OUT = 20
 
 _MAG_REJECTED = int(Flag.MAG_REJECTED)
 
@@ -66,9 +66,9 @@ class QuaternionKalmanFilter(BiasKalmanFilter):
 
     outputs = {  # noqa: RUF012  (a constant of the class)
         "gyr_bias": slice(4, 7),
-        "covariance": slice(7, 13),
-        "gyr_bias_sigma": slice(13, 16),
-        "field_departure": slice(16, 17),
+        "covariance": slice(7, 16),
+        "gyr_bias_sigma": slice(16, 19),
+        "field_departure": slice(19, 20),
     }
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:

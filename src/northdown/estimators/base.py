@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from northdown._validation import FloatArray, as_float_array, check_choice, check_no_infinity, check_number
 from northdown.errors import InputError, expected
-from northdown.frames import Frame, check_frame, quat_from_ned, rotation_between
+from northdown.frames import Frame, check_frame, quat_from_ned
 from northdown.kernels.runner import (
     COUNT,
     GYRO_GAP,
@@ -76,8 +76,8 @@ class Estimator(abc.ABC):
     """Sensors that the filter's steps use."""
     kernel: ClassVar[Kernel]
     outputs: ClassVar[Mapping[str, slice]] = types.MappingProxyType({})
-    """Where `gyr_bias`, its sigma and the `covariance` (six entries, NED) stand in what the kernel records; other
-    names, of one column each, become `Orientation.diagnostics`."""
+    """Where `gyr_bias`, its sigma and the `covariance` (nine entries by rows) stand in what the kernel records;
+    other names, of one column each, become `Orientation.diagnostics`."""
     singular: ClassVar[str] = ""
     """Attitudes in which the method fails, in words; empty for none."""
 
@@ -309,7 +309,7 @@ class Stream:
             frame=self.frame,
             flags=flags,
             name=estimator.name,
-            **_outputs(estimator.outputs, out, self.frame),
+            **_outputs(estimator.outputs, out),
         )
 
     def _raise(self, code: int, time: float, at: int) -> typing.NoReturn:
@@ -344,29 +344,18 @@ class Stream:
         )
 
 
-def _outputs(where: Mapping[str, slice], out: FloatArray, frame: Frame) -> dict[str, Any]:
+def _outputs(where: Mapping[str, slice], out: FloatArray) -> dict[str, Any]:
     """Fields of the `Orientation` from what the kernel recorded after the quaternion."""
     fields: dict[str, Any] = {}
     for key, columns in where.items():
         values = out[:, columns]
         if key == "covariance":
-            fields[key] = _covariance(values, frame)
+            fields[key] = values.reshape(-1, 3, 3)
         elif key in _ORIENTATION_FIELDS:
             fields[key] = values
         else:
             fields.setdefault("diagnostics", {})[key] = values[:, 0]
     return fields
-
-
-def _covariance(upper: FloatArray, frame: Frame) -> FloatArray:
-    """Matrices (N, 3, 3) in `frame` from upper triangles (N, 6) by rows in NED; frames differ by whole axes."""
-    entry = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
-    mat = rotation_between("NED", frame).as_matrix().round()
-    axis, sign = np.abs(mat).argmax(axis=1), mat.sum(axis=1)
-    result = np.empty((len(upper), 3, 3))
-    for i, j in np.ndindex(3, 3):
-        np.multiply(upper[:, entry[axis[i], axis[j]]], sign[i] * sign[j], out=result[:, i, j])
-    return result
 
 
 def _start(turn: FloatArray, initial: Rotation | None) -> tuple[FloatArray, int]:

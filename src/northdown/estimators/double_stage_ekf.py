@@ -52,8 +52,8 @@ from northdown.estimators._quaternion_kalman import (
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct_field, correct_up, relative_to
 from northdown.kernels.quaternion import conjugate, down_b, multiply, normalize, rotate, unit
+from northdown.kernels.quaternion_kalman import correct_field, correct_up, relative_to
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
 from northdown.kernels.wahba import has_heading
@@ -148,6 +148,7 @@ class DoubleStageEKF(QuaternionKalmanFilter):
         output=output,
         aligned=aligned,
         flagged=flagged,
+        covariance=7,
     )
 
     isolation: Literal["navigation", "additive"] = "navigation"

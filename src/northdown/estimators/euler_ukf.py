@@ -49,6 +49,7 @@ from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
+from northdown.kernels.kalman import symmetric3
 from northdown.kernels.quaternion import dot, multiply, rotate, unit
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
@@ -296,7 +297,7 @@ def output(p: Any, s: Any) -> Any:
     z0 = p02 - sp * p00
     c00, c01, c11 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1, u1 * a1 + v1 * b1
     c02, c12 = w0 - sp * u0, w1 - sp * u1
-    return (s[0], s[1], s[2], s[3], c00, c01, c02, c11, c12, w2 - sp * z0, s[19])
+    return s[:4] + symmetric3(c00, c01, c02, c11, c12, w2 - sp * z0) + (s[19],)
 
 
 @inline
@@ -336,9 +337,17 @@ class EulerUKF(KalmanFilter):
 
     name = "euler-ukf"
     kernel = Kernel(
-        "euler-ukf", step, n_params=18, n_state=20, n_out=11, output=output, aligned=aligned, flagged=flagged
+        "euler-ukf",
+        step,
+        n_params=18,
+        n_state=20,
+        n_out=14,
+        output=output,
+        aligned=aligned,
+        flagged=flagged,
+        covariance=4,
     )
-    outputs = {"covariance": slice(4, 10), "field_departure": slice(10, 11)}  # noqa: RUF012  (constant)
+    outputs = {"covariance": slice(4, 13), "field_departure": slice(13, 14)}  # noqa: RUF012  (constant)
     singular = "pitch ±90°"
 
     dip: float | None = parameter(None, unit="rad", low=-1.56, high=1.56)

@@ -33,8 +33,8 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import attitude_covariance, correct7, quaternion_covariance, relative_to
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
+from northdown.kernels.quaternion_kalman import attitude_covariance, correct7, quaternion_covariance, relative_to
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 from northdown.kernels.weighting import field_departure, linear_acceleration
@@ -148,12 +148,13 @@ class GyroEulerEKF(KalmanFilter):
         step,
         n_params=15,
         n_state=N_STATE,
-        n_out=11,
+        n_out=14,
         output=output,
         aligned=aligned,
         flagged=flags,
+        covariance=4,
     )
-    outputs = {"covariance": slice(4, 10), "field_departure": slice(10, 11)}  # noqa: RUF012  (constant)
+    outputs = {"covariance": slice(4, 13), "field_departure": slice(13, 14)}  # noqa: RUF012  (constant)
     singular = "pitch ±90°"
 
     singular_pitch: float = parameter(1.4, unit="rad", low=0.0, high=1.5708)

@@ -48,7 +48,7 @@ from northdown.estimators._kalman import BiasKalmanFilter
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import propagate_attitude_bias, reduce6
+from northdown.kernels.kalman import propagate_attitude_bias, reduce6, symmetric3
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
@@ -162,7 +162,7 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 def output(p: Any, s: Any) -> Any:
     """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u."""
     sigma = (math.sqrt(s[22]), math.sqrt(s[25]), math.sqrt(s[27]))
-    return s[:7] + (s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (s[34],)
+    return s[:7] + symmetric3(s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (s[34],)
 
 
 @inline
@@ -181,12 +181,14 @@ class MEKF(BiasKalmanFilter):
     """
 
     name = "mekf"
-    kernel = Kernel("mekf", step, n_params=14, n_state=35, n_out=17, output=output, aligned=aligned, flagged=flagged)
+    kernel = Kernel(
+        "mekf", step, n_params=14, n_state=35, n_out=20, output=output, aligned=aligned, flagged=flagged, covariance=7
+    )
     outputs = {  # noqa: RUF012  (a constant of the class)
         "gyr_bias": slice(4, 7),
-        "covariance": slice(7, 13),
-        "gyr_bias_sigma": slice(13, 16),
-        "field_departure": slice(16, 17),
+        "covariance": slice(7, 16),
+        "gyr_bias_sigma": slice(16, 19),
+        "field_departure": slice(19, 20),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:

@@ -22,6 +22,12 @@ Source: R.-C. Jia, Optics and Precision Engineering 22(12), 2014, doi:10.3788/OP
 Deviations: J14's P(0) is σ²/T of each sensor, which presumes a start at rest and a known T; here the start's
 uncertainty is given in radians, and P(0) = ¼ Ξ diag(tilt², tilt², heading²) Ξᵀ, its (7). Vectors are normalised; the
 disturbance weighting is added (`motion_time=0` and wide gates switch it off). In J14 (6) q2 uses T13 − T31.
+
+A correction moves q to q⁺, and P_qq to M P_qq Mᵀ with M v = v ⊗ q* ⊗ q⁺, so that the error e of (e + 1) ⊗ q keeps its
+covariance. J14 leaves P_qq, an error added to q⁺. What no measurement tells, the turn about the vertical without a
+magnetometer, is then another direction after each correction than before; P loses variance along both, and heading
+is claimed to be known that nobody has measured: over a minute, 3° for errors of 57°. Source of the effect:
+G. P. Huang, A. I. Mourikis, S. I. Roumeliotis, Int. J. Robotics Research 29(5), 2010, doi:10.1177/0278364909353640.
 """
 
 from __future__ import annotations
@@ -44,8 +50,8 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct_field, correct_up, relative_to
 from northdown.kernels.quaternion import dot, multiply, normalize, rotate, unit
+from northdown.kernels.quaternion_kalman import correct_both, correct_field, correct_up
 from northdown.kernels.runner import Kernel
 from northdown.kernels.weighting import field_departure, linear_acceleration
 from northdown.orientation import Flag
@@ -65,24 +71,36 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
     q, cov = predict(p, q, b, cov, gyr, dt)
 
-    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if is_sample(acc) and age_acc > 0.0:
+    has_acc = is_sample(acc) and age_acc > 0.0
+    has_mag = dot(mag, mag) > 0.0 and age_mag > 0.0
+    up, h = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    r_acc, r_mag, north, down = 0.0, 0.0, 0.0, 0.0
+    if has_acc:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
-        r = (acc_var + motion_time * motion) / (g * g * age_acc)
-        cov, d = correct_up(cov, d, (force[0] / g, force[1] / g, force[2] / g + 1.0), r)
+        r_acc = (acc_var + motion_time * motion) / (g * g * age_acc)
+        up = (force[0] / g, force[1] / g, force[2] / g + 1.0)
         age_acc = 0.0
-    if dot(mag, mag) > 0.0 and age_mag > 0.0:
+    if has_mag:
         h = rotate(q, mag)
         u, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
         dip = p[14] if p[14] == p[14] else field[1]
         north, down = math.cos(dip), math.sin(dip)
         h = unit(h)
-        r = mag_var * math.exp(u) / age_mag
-        cov, d = correct_field(cov, d, (h[0] - north, h[1], h[2] - down), north, down, r)
+        h = (h[0] - north, h[1], h[2] - down)
+        r_mag = mag_var * math.exp(u) / age_mag
         age_mag = 0.0
+
+    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if has_acc and has_mag:
+        cov, d = correct_both(cov, d, up, r_acc, h, north, down, r_mag)
+    elif has_acc:
+        cov, d = correct_up(cov, d, up, r_acc)
+    elif has_mag:
+        cov, d = correct_field(cov, d, h, north, down, r_mag)
     turn = normalize((1.0 + d[0], d[1], d[2], d[3]))
-    q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
+    # e is kept while q moves: see the deviations above
+    q = normalize(multiply(turn, q))
     return q + (b[0] + d[4], b[1] + d[5], b[2] + d[6]) + cov + (motion, age_acc, age_mag) + field + (u,)
 
 
@@ -114,6 +132,7 @@ class QuaternionEKF(QuaternionKalmanFilter):
         output=output,
         aligned=aligned,
         flagged=flagged,
+        covariance=7,
     )
 
     dip: float | None = parameter(None, unit="rad", low=-1.56, high=1.56)

@@ -107,6 +107,28 @@ def rotate_inverse(q: Quaternion, v: Vector) -> Vector:
 
 
 @inline
+def whole_axes(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+    """Rows of the matrix of a rotation that maps axes on axes: entries of exactly 0, 1 and −1."""
+    x, y, z = rotate(q, (1.0, 0.0, 0.0)), rotate(q, (0.0, 1.0, 0.0)), rotate(q, (0.0, 0.0, 1.0))
+    return (
+        (float(round(x[0])), float(round(y[0])), float(round(z[0]))),
+        (float(round(x[1])), float(round(y[1])), float(round(z[1]))),
+        (float(round(x[2])), float(round(y[2])), float(round(z[2]))),
+    )
+
+
+@inline
+def congruent(m: tuple[Vector, Vector, Vector], c: tuple[float, ...]) -> tuple[float, ...]:
+    """Nine entries by rows of M C Mᵀ, for a symmetric C of nine entries and M by rows."""
+    rows = ((c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8]))
+    a = (dot(rows[0], m[0]), dot(rows[1], m[0]), dot(rows[2], m[0]))
+    b = (dot(rows[0], m[1]), dot(rows[1], m[1]), dot(rows[2], m[1]))
+    d = (dot(rows[0], m[2]), dot(rows[1], m[2]), dot(rows[2], m[2]))
+    xy, xz, yz = dot(a, m[1]), dot(a, m[2]), dot(b, m[2])
+    return (dot(a, m[0]), xy, xz, xy, dot(b, m[1]), yz, xz, yz, dot(d, m[2]))
+
+
+@inline
 def from_matrix(
     r00: float, r01: float, r02: float, r10: float, r11: float, r12: float, r20: float, r21: float, r22: float
 ) -> Quaternion:

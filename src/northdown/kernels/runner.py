@@ -23,7 +23,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple as _to_fixed_tuple
 
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.numpy_abi import IN_PLACE, THROUGH_NUMBA, Reading, layout_holds
-from northdown.kernels.quaternion import dot, down_b, multiply
+from northdown.kernels.quaternion import congruent, dot, down_b, multiply, whole_axes
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 
 # The runner's own entries at the head of the state array.
@@ -150,6 +150,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
     tick = _make_tick(kernel)
     output = kernel.output
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+    first = kernel.covariance
 
     def run(
         params: Array,
@@ -168,6 +169,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
         last = state[LAST]
         f = (turn[0], turn[1], turn[2], turn[3])
         is_turned = f[0] != 1.0
+        axes = whole_axes(f)
         code = OK
         done = len(time)
         for i in range(len(time)):
@@ -203,6 +205,10 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
                     out[i, j] = o[j]
             for j in range(4, n_out):
                 out[i, j] = o[j]
+            if is_turned and first > 0:
+                c = congruent(axes, to_fixed_tuple(out[i, first:], 9))
+                for j in range(9):
+                    out[i, first + j] = c[j]
         if code == OK and len(time) > 0 and not is_attitude(s[0], s[1], s[2], s[3]):
             code = NOT_FINITE
             for i in range(len(time)):
@@ -323,6 +329,9 @@ class Kernel:
         when tilt is found, and again when heading is, or once for both.
     flagged : inlined function
         ``flagged(p, s) -> int``, further flags of the sample just taken.
+    covariance : int
+        Where the nine entries of the attitude's covariance in NED stand in what is recorded, 0 for none. A whole
+        recording's are turned to the frame of the result; a live sample's are not.
     memoryless : bool
         Whether the step also takes the samples from which the start was found. A filter must not: it would count
         them twice.
@@ -344,6 +353,7 @@ class Kernel:
     aligned: Callable[..., Any] = replace_attitude
     flagged: Callable[..., int] = no_flags
     memoryless: bool = False
+    covariance: int = 0
 
     def workspace(self) -> Workspace:
         """New arrays for one running estimate, all zero."""

@@ -32,9 +32,9 @@ def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> A
     """
     norm_gate, dip_gate, window = gates
     norm, dip, age = reference
-    horizontal = math.sqrt(field_n[0] * field_n[0] + field_n[1] * field_n[1])
-    n = math.sqrt(horizontal * horizontal + field_n[2] * field_n[2])
-    a = math.atan2(field_n[2], horizontal)
+    square = field_n[0] * field_n[0] + field_n[1] * field_n[1]
+    n = math.sqrt(square + field_n[2] * field_n[2])
+    a = math.atan2(field_n[2], math.sqrt(square))
     age += dt
     if norm == 0.0:
         return 0.0, (n, a, age)
