@@ -151,6 +151,14 @@ def predict7(f, noise, q, b, P, gyr, dt):
     return product(q, turn), F @ P @ F.T + Q
 
 
+def carried(P, old, new):
+    """P of the quaternion (and bias), such that the error e in (1 + e) ⊗ q keeps its covariance while q moves."""
+    moved = product(old * [1.0, -1.0, -1.0, -1.0], new)
+    M = np.eye(len(P))
+    M[:4, :4] = np.array([product(unit, moved) for unit in np.eye(4)]).T
+    return M @ P @ M.T
+
+
 def dense_quaternion_ekf(f, recording, q):
     b, noise, P = np.zeros(3), Weights(f), start7(f, q)
     for _, dt, gyr, (acc, mag), (age_acc, age_mag) in samples(recording):
@@ -172,10 +180,7 @@ def dense_quaternion_ekf(f, recording, q):
             d = K @ np.concatenate(z)
             P = (np.eye(7) - K @ H) @ P
             old, q, b = q, (q + d[:4]) / np.linalg.norm(q + d[:4]), b + d[4:]
-            # the error from the left, e in (1 + e) q, keeps its covariance while q moves
-            moved = product(old * [1.0, -1.0, -1.0, -1.0], q)
-            M = block_diag(np.array([product(unit, moved) for unit in np.eye(4)]).T, np.eye(3))
-            P = M @ P @ M.T
+            P = carried(P, old, q)
     E = rotation_basis(q)
     return q, b, E @ P[:4, :4] @ E.T, np.sqrt(np.diag(P)[4:])
 
@@ -187,13 +192,15 @@ def dense_double_stage(f, recording, q):
         H = np.hstack([jacobian(expected, q), np.zeros((3, 3))])
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r * np.eye(3))
         d = K @ (measured - expected(q))
+        old = q
         if f.isolation == "additive":
             kept = np.where([True, *keep], d[:4], 0.0)
             q = q + kept
         else:
             delta = np.where(keep, rotation_basis(q) @ d[:4], 0.0)
             q = wxyz(Rotation.from_rotvec(delta) * rot(q))
-        return q / np.linalg.norm(q), b + f.bias_update * d[4:], (np.eye(7) - K @ H) @ P
+        q = q / np.linalg.norm(q)
+        return q, b + f.bias_update * d[4:], carried((np.eye(7) - K @ H) @ P, old, q)
 
     for _, dt, gyr, (acc, mag), (age_acc, age_mag) in samples(recording):
         q, P = predict7(f, noise, q, b, P, gyr, dt)
@@ -310,9 +317,9 @@ def dense_gyro_euler(f, recording, q):
         R = np.diag([tilt / c2, tilt, heading + tilt * (1.0 - c2) / c2])
         H = jacobian(lambda q: angles_of(rot(q / np.linalg.norm(q))), q)
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
-        q = q + K @ circular(measured - x)
+        old, q = q, q + K @ circular(measured - x)
         q /= np.linalg.norm(q)
-        P = (np.eye(4) - K @ H) @ P
+        P = carried((np.eye(4) - K @ H) @ P, old, q)
         age = 0.0
     E = rotation_basis(q)
     return q, None, E @ P @ E.T, None

@@ -23,6 +23,9 @@ navigation frame. With δq = ½ (0, δ) ⊗ q they are: ``isolation="navigation"
 rotation δ about north, east and down, δ_j = 2 ⟨(0, e_j) ⊗ q, ε⟩, and drops δ_down in stage 1, δ_north and δ_east in
 stage 2. That is exact to first order in every attitude and in every mounting.
 
+As in `quaternion_ekf`, P belongs to the error e of (1 + e) ⊗ q and stays as it is when q moves; its docstring says
+why.
+
 P does not know of what was dropped, so it is too small where the two sensors disagree; use `mekf` for a covariance
 to rely on.
 
@@ -53,7 +56,7 @@ from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import conjugate, down_b, multiply, normalize, rotate, unit
-from northdown.kernels.quaternion_kalman import correct_field, correct_up, relative_to
+from northdown.kernels.quaternion_kalman import correct_field, correct_up
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
 from northdown.kernels.wahba import has_heading
@@ -101,7 +104,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
         cov, d = correct_up(cov, nothing, (force[0] / g, force[1] / g, force[2] / g + 1.0), r)
         turn = tilt_only(q, (d[0], d[1], d[2], d[3]), additive)
-        q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
+        q = normalize(multiply(turn, q))
         b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
         age_acc = 0.0
     if has_heading(down_b(q), mag) and age_mag > 0.0:
@@ -112,7 +115,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r = mag_var * math.exp(u) / age_mag
         cov, d = correct_field(cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
         turn = heading_only(q, (d[0], d[1], d[2], d[3]), additive)
-        q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
+        q = normalize(multiply(turn, q))
         b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
         age_mag = 0.0
     return q + b + cov + (motion, age_acc, age_mag) + field + (u,)

@@ -34,7 +34,7 @@ from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
-from northdown.kernels.quaternion_kalman import attitude_covariance, correct7, quaternion_covariance, relative_to
+from northdown.kernels.quaternion_kalman import attitude_covariance, correct7, quaternion_covariance
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 from northdown.kernels.weighting import field_departure, linear_acceleration
@@ -107,7 +107,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
             )
             cov, d = correct_angles(cov, angles, residual, r)
             turn = normalize((1.0 + d[0], d[1], d[2], d[3]))
-            q, cov = normalize(multiply(turn, q)), relative_to(cov, turn)
+            q = normalize(multiply(turn, q))
         age = 0.0
     return q + (0.0, 0.0, 0.0) + cov + (motion, age, 0.0) + field + (u,)
 

@@ -206,31 +206,6 @@ def propagate_quaternion_bias(p: Any, q: Any, after: Any, dt: float, q_quat: flo
 
 
 @inline
-def relative_to(p: Any, turn: Any) -> Any:
-    """Covariance of (e, bias) for the attitude turn ⊗ q instead of q: e ⊗ q = (e ⊗ turn*) ⊗ (turn ⊗ q)."""
-    t = conjugate(turn)
-    m0 = multiply((p[4], p[10], p[15], p[19]), t)
-    m1 = multiply((p[5], p[11], p[16], p[20]), t)
-    m2 = multiply((p[6], p[12], p[17], p[21]), t)
-    a0 = multiply((p[0], p[1], p[2], p[3]), t)
-    a1 = multiply((p[1], p[7], p[8], p[9]), t)
-    a2 = multiply((p[2], p[8], p[13], p[14]), t)
-    a3 = multiply((p[3], p[9], p[14], p[18]), t)
-    # a_k is column k of the product from the left, so its rows times the transpose are again products by t
-    b0 = multiply((a0[0], a1[0], a2[0], a3[0]), t)
-    b1 = multiply((a0[1], a1[1], a2[1], a3[1]), t)
-    b2 = multiply((a0[2], a1[2], a2[2], a3[2]), t)
-    b3 = multiply((a0[3], a1[3], a2[3], a3[3]), t)
-    return (
-        (b0[0], b0[1], b0[2], b0[3], m0[0], m1[0], m2[0])
-        + (b1[1], b1[2], b1[3], m0[1], m1[1], m2[1])
-        + (b2[2], b2[3], m0[2], m1[2], m2[2])
-        + (b3[3], m0[3], m1[3], m2[3])
-        + p[22:]
-    )
-
-
-@inline
 def cross_term(f: Any, i: int, j: int) -> Any:
     """Entry (i, j) of (M B) Lᵀ + L Nᵀ, with N = M B + L C."""
     m, l, n = f
