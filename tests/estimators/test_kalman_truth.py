@@ -50,7 +50,11 @@ class Weights:
     """The noise model of the docstrings, from the filter's parameters."""
 
     def __init__(self, f):
-        self.f, self.motion, self.norm, self.dip, self.age, self.u = f, 0.0, 0.0, 0.0, 0.0, 0.0
+        self.f, self.motion, self.age, self.u, self.reference = f, 0.0, 0.0, 0.0, np.ones(2)
+
+    @property
+    def dip(self):
+        return math.atan2(self.reference[1], self.reference[0])
 
     def gyr(self, rate, dt):
         return (self.f.gyr_noise**2 + self.f.gyr_scale**2 * (rate @ rate)) * dt
@@ -63,16 +67,17 @@ class Weights:
 
     def mag(self, h, dt):
         f = self.f
-        n, a = np.linalg.norm(h), math.atan2(h[2], math.hypot(h[0], h[1]))
+        sample = np.array([math.hypot(h[0], h[1]), h[2]])
         self.age += dt
-        if self.norm == 0.0:
-            self.norm, self.dip = n, a
+        if self.age == dt:
+            self.reference = sample
         else:
-            u = min(60.0, ((n / self.norm - 1.0) / f.norm_gate) ** 2 + ((a - self.dip) / f.dip_gate) ** 2)
+            norm = np.linalg.norm(sample) / np.linalg.norm(self.reference)
+            off = math.sin(math.atan2(sample[1], sample[0]) - self.dip)
+            u = min(60.0, ((norm - 1.0) / f.norm_gate) ** 2 + (off / f.dip_gate) ** 2)
             self.u = u * np.clip(self.age - 1.0, 0.0, 1.0)
             k = math.exp(-self.u) * dt / min(self.age, f.field_window + dt)
-            self.norm += k * (n - self.norm)
-            self.dip += k * (a - self.dip)
+            self.reference = self.reference + k * (sample - self.reference)
         return (f.mag_noise / f.field) ** 2 * math.exp(self.u) / dt
 
 

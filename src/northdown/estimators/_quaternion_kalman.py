@@ -1,7 +1,8 @@
 """What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
 
 State tuple: quaternion 4, bias 3, P 28 (of (e, bias) with δq = e ⊗ q, see `kernels.quaternion_kalman`), mean square
-of linear acceleration, ages of acc and mag, field's norm, dip and age, departure u of the last field sample.
+of linear acceleration, ages of acc and mag, field's horizontal and down part and age, departure u of the last field
+sample.
 """
 
 from __future__ import annotations

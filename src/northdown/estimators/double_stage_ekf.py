@@ -86,7 +86,7 @@ def heading_only(q: Any, e: Any, additive: float) -> Any:
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's norm, dip and age, u)."""
+    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
     additive, bias_update = p[14], p[15]
     q, b = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6])
@@ -109,10 +109,10 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         age_acc = 0.0
     if has_heading(down_b(q), mag) and age_mag > 0.0:
         h = rotate(q, mag)
-        u, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
+        u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
         h = unit(h)
         north = math.sqrt(h[0] * h[0] + h[1] * h[1])
-        r = mag_var * math.exp(u) / age_mag
+        r = mag_var / (weight * age_mag)
         cov, d = correct_field(cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
         turn = heading_only(q, (d[0], d[1], d[2], d[3]), additive)
         q = normalize(multiply(turn, q))

@@ -53,7 +53,7 @@ from northdown.kernels.kalman import symmetric3
 from northdown.kernels.quaternion import dot, multiply, rotate, unit
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
-from northdown.kernels.weighting import REJECTED, field_departure, linear_acceleration
+from northdown.kernels.weighting import REJECTED, field_departure, field_direction, linear_acceleration
 from northdown.orientation import Flag
 
 _MAG_REJECTED = int(Flag.MAG_REJECTED)
@@ -230,7 +230,7 @@ def correct(
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (quaternion, angles, P, motion, ages of acc and mag, field's norm, dip and age, u)."""
+    """One sample; s = (quaternion, angles, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
     gyr_var, scale_var, acc_var, motion_time, motion_window, mag_var, g = p[:7]
     alpha2, beta, kappa, rfu = p[12], p[13], p[14], p[15]
     x, cov = (s[4], s[5], s[6]), s[7:13]
@@ -257,13 +257,15 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
             z[0], z[1], z[2] = force[0] / g, force[1] / g, force[2] / g
             age_acc = 0.0
         if has_mag:
-            u, field = field_departure((p[7], p[8], p[9]), field, rotate(q, direction), age_mag)
-            r_mag = mag_var * math.exp(u) / age_mag
+            u, weight, field = field_departure((p[7], p[8], p[9]), field, rotate(q, direction), age_mag)
+            r_mag = mag_var / (weight * age_mag)
             a = unit(direction)
             z[3], z[4], z[5] = a[0], a[1], a[2]
             age_mag = 0.0
-        dip = p[16] if p[16] == p[16] else field[1]
-        x, cov = correct(x, cov, z, m, (r_acc, r_mag), math.cos(dip), math.sin(dip), scale, w0, w)
+        north, down = p[16], p[17]
+        if north != north and field[2] > 0.0:
+            north, down = field_direction(field)
+        x, cov = correct(x, cov, z, m, (r_acc, r_mag), north, down, scale, w0, w)
     q = remount_quaternion(rfu, euler.from_zyx(x))
     return q + x + cov + (motion, age_acc, age_mag) + field + (u,)
 
@@ -304,7 +306,7 @@ def output(p: Any, s: Any) -> Any:
 def flagged(p: Any, s: Any) -> int:
     """Whether the magnetometer's sample was all but rejected, and whether pitch is near ±90°."""
     flags = _MAG_REJECTED if s[19] > REJECTED else 0
-    if math.fabs(s[5]) > p[17]:
+    if math.fabs(s[5]) > p[18]:
         flags |= _NEAR_SINGULAR
     return flags
 
@@ -339,7 +341,7 @@ class EulerUKF(KalmanFilter):
     kernel = Kernel(
         "euler-ukf",
         step,
-        n_params=18,
+        n_params=19,
         n_state=20,
         n_out=14,
         output=output,
@@ -376,7 +378,7 @@ class EulerUKF(KalmanFilter):
             self.beta,
             self.kappa,
             float(self.axes == "rfu"),
-            math.nan if self.dip is None else self.dip,
+            *((math.nan, math.nan) if self.dip is None else (math.cos(self.dip), math.sin(self.dip))),
             self.singular_pitch,
         )
 

@@ -95,7 +95,7 @@ def correct_heading(p: Any, d: Any, heading: float, slope: float, r: float) -> A
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, age of acc, age of mag, field's norm, dip and age, u)."""
+    """One sample; s = (w, x, y, z, b, P, motion, age of acc, age of mag, field's horizontal, down and age, u)."""
     gyr_var, scale_var, walk_var, acc_var, motion_time, motion_window, mag_var, g, norm_gate, dip_gate, window = p[
         :11
     ]
@@ -132,9 +132,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         age_acc = 0.0
     if has_heading(down_b(q), mag) and age_mag > 0.0:
         h = rotate(q, mag)
-        u, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
+        u, weight, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
         square = h[0] * h[0] + h[1] * h[1]
-        r = mag_var * (1.0 + h[2] * h[2] / square) * math.exp(u) / age_mag
+        r = mag_var * (1.0 + h[2] * h[2] / square) / (weight * age_mag)
         cov, d = correct_heading(cov, d, math.atan2(h[1], h[0]), h[2] / math.sqrt(square), r)
         age_mag = 0.0
     q = normalize(multiply(exp((d[0], d[1], d[2])), q))

@@ -53,7 +53,7 @@ from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import dot, multiply, normalize, rotate, unit
 from northdown.kernels.quaternion_kalman import correct_both, correct_field, correct_up
 from northdown.kernels.runner import Kernel
-from northdown.kernels.weighting import field_departure, linear_acceleration
+from northdown.kernels.weighting import field_departure, field_direction, linear_acceleration
 from northdown.orientation import Flag
 
 _MAG_REJECTED = int(Flag.MAG_REJECTED)
@@ -61,7 +61,7 @@ _MAG_REJECTED = int(Flag.MAG_REJECTED)
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's norm, dip and age, u)."""
+    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
     q, b = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6])
     cov = s[7:35]
@@ -79,16 +79,18 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
         r_acc = (acc_var + motion_time * motion) / (g * g * age_acc)
-        up = (force[0] / g, force[1] / g, force[2] / g + 1.0)
+        k = 1.0 / g
+        up = (k * force[0], k * force[1], k * force[2] + 1.0)
         age_acc = 0.0
     if has_mag:
         h = rotate(q, mag)
-        u, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
-        dip = p[14] if p[14] == p[14] else field[1]
-        north, down = math.cos(dip), math.sin(dip)
+        u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
+        north, down = p[14], p[15]
+        if north != north:
+            north, down = field_direction(field)
         h = unit(h)
         h = (h[0] - north, h[1], h[2] - down)
-        r_mag = mag_var * math.exp(u) / age_mag
+        r_mag = mag_var / (weight * age_mag)
         age_mag = 0.0
 
     d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -98,9 +100,8 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         cov, d = correct_up(cov, d, up, r_acc)
     elif has_mag:
         cov, d = correct_field(cov, d, h, north, down, r_mag)
-    turn = normalize((1.0 + d[0], d[1], d[2], d[3]))
-    # e is kept while q moves: see the deviations above
-    q = normalize(multiply(turn, q))
+    # P stays as it is while q moves: see the deviations above
+    q = normalize(multiply((1.0 + d[0], d[1], d[2], d[3]), q))
     return q + (b[0] + d[4], b[1] + d[5], b[2] + d[6]) + cov + (motion, age_acc, age_mag) + field + (u,)
 
 
@@ -126,7 +127,7 @@ class QuaternionEKF(QuaternionKalmanFilter):
     kernel = Kernel(
         "quaternion-ekf",
         step,
-        n_params=15,
+        n_params=16,
         n_state=N_STATE,
         n_out=N_OUT,
         output=output,
@@ -140,5 +141,5 @@ class QuaternionEKF(QuaternionKalmanFilter):
     def _parameters(self, frame: Frame) -> Sequence[float]:
         return (
             *self._bias_noise(),
-            math.nan if self.dip is None else self.dip,
+            *((math.nan, math.nan) if self.dip is None else (math.cos(self.dip), math.sin(self.dip))),
         )

@@ -25,20 +25,32 @@ def linear_acceleration(mean_square: float, force_n: Vector, g: float, dt: float
 
 @inline
 def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> Any:
-    """Departure u of the field from its reference, and the reference (norm, dip, age) after this sample.
+    """Departure u of the field from its reference, e⁻ᵘ, and the reference (horizontal, down, age) after this sample.
 
-    u = (Δnorm / norm / gate₁)² + (Δdip / gate₂)², at most 60, and nothing in the first second. The reference is the
-    mean of all samples so far, each with weight e⁻ᵘ, forgotten with the time constant `window`.
+    u = (Δnorm / norm / gate₁)² + (sin Δdip / gate₂)², at most 60, and nothing in the first second. The reference is
+    the mean of all samples so far, each with weight e⁻ᵘ, forgotten with the time constant `window`.
     """
     norm_gate, dip_gate, window = gates
-    norm, dip, age = reference
+    horizontal, down, age = reference
     square = field_n[0] * field_n[0] + field_n[1] * field_n[1]
-    n = math.sqrt(square + field_n[2] * field_n[2])
-    a = math.atan2(field_n[2], math.sqrt(square))
+    h, z = math.sqrt(square), field_n[2]
     age += dt
-    if norm == 0.0:
-        return 0.0, (n, a, age)
-    e, c = (n / norm - 1.0) / norm_gate, (a - dip) / dip_gate
+    norm2 = horizontal * horizontal + down * down
+    if norm2 == 0.0:
+        return 0.0, 1.0, (h, z, age)
+    # one division serves both: sizes relative to the reference, with n² / norm² = (n / norm)²
+    inverse = 1.0 / norm2
+    ratio = math.sqrt((square + z * z) * inverse)
+    e = (ratio - 1.0) / norm_gate
+    c = (z * horizontal - h * down) * inverse / (ratio * dip_gate)
     u = min(60.0, e * e + c * c) * min(1.0, max(0.0, age / LEARN - 1.0))
-    k = math.exp(-u) * dt / min(age, window + dt)
-    return u, (norm + k * (n - norm), dip + k * (a - dip), age)
+    weight = math.exp(-u)
+    k = weight * dt / min(age, window + dt)
+    return u, weight, (horizontal + k * (h - horizontal), down + k * (z - down), age)
+
+
+@inline
+def field_direction(reference: Any) -> Any:
+    """North and down part of the reference's direction: cosine and sine of its dip."""
+    k = 1.0 / math.sqrt(reference[0] * reference[0] + reference[1] * reference[1])
+    return k * reference[0], k * reference[1]
