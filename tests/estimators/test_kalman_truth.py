@@ -72,9 +72,11 @@ class Weights:
         if self.age == dt:
             self.reference = sample
         else:
-            norm = np.linalg.norm(sample) / np.linalg.norm(self.reference)
-            off = math.sin(math.atan2(sample[1], sample[0]) - self.dip)
-            u = min(60.0, ((norm - 1.0) / f.norm_gate) ** 2 + (off / f.dip_gate) ** 2)
+            size = np.linalg.norm(self.reference)
+            off = (sample - self.reference) / size
+            along = self.reference / size
+            across = off - (off @ along) * along
+            u = min(60.0, (off @ along / f.norm_gate) ** 2 + across @ across / f.dip_gate**2)
             self.u = u * np.clip(self.age - 1.0, 0.0, 1.0)
             k = math.exp(-self.u) * dt / min(self.age, f.field_window + dt)
             self.reference = self.reference + k * (sample - self.reference)

@@ -23,7 +23,7 @@ Magnetometer: the heading ε = atan2(h_y, h_x) of h = R̂ m_b, one scalar:
 
 .. math::  \varepsilon = -\delta_z + \delta_x\, h_z / h_h, \qquad
            R_m = \sigma_m^2 / (B_h^2\, \Delta t) \cdot e^{u}, \qquad
-           u = (\Delta\lVert m \rVert / \lVert m \rVert / w_1)^2 + (\Delta\text{dip} / w_2)^2
+           u = (\Delta_\text{norm} / w_1)^2 + (\Delta_\text{dip} / w_2)^2
 
 so that a disturbed field, known by its norm or its dip, is weighted down smoothly. Norm and dip are compared with a
 reference, the mean of the past over `field_window`, weighted by e⁻ᵘ; the first second is not judged. A sample with

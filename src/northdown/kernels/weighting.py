@@ -27,22 +27,21 @@ def linear_acceleration(mean_square: float, force_n: Vector, g: float, dt: float
 def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> Any:
     """Departure u of the field from its reference, e⁻ᵘ, and the reference (horizontal, down, age) after this sample.
 
-    u = (Δnorm / norm / gate₁)² + (sin Δdip / gate₂)², at most 60, and nothing in the first second. The reference is
-    the mean of all samples so far, each with weight e⁻ᵘ, forgotten with the time constant `window`.
+    Of the sample's (horizontal, down) less the reference's, relative to the reference's size, the part along it is
+    the departure of the norm, the part across it that of the dip: u = (along / gate₁)² + (across / gate₂)², at most
+    60, and nothing in the first second. The reference is the mean of all samples so far, each with weight e⁻ᵘ,
+    forgotten with the time constant `window`.
     """
     norm_gate, dip_gate, window = gates
     horizontal, down, age = reference
-    square = field_n[0] * field_n[0] + field_n[1] * field_n[1]
-    h, z = math.sqrt(square), field_n[2]
+    h, z = math.sqrt(field_n[0] * field_n[0] + field_n[1] * field_n[1]), field_n[2]
     age += dt
-    norm2 = horizontal * horizontal + down * down
-    if norm2 == 0.0:
+    square = horizontal * horizontal + down * down
+    if square == 0.0:
         return 0.0, 1.0, (h, z, age)
-    # one division serves both: sizes relative to the reference, with n² / norm² = (n / norm)²
-    inverse = 1.0 / norm2
-    ratio = math.sqrt((square + z * z) * inverse)
-    e = (ratio - 1.0) / norm_gate
-    c = (z * horizontal - h * down) * inverse / (ratio * dip_gate)
+    k = 1.0 / square
+    e = (k * (h * horizontal + z * down) - 1.0) / norm_gate
+    c = k * (z * horizontal - h * down) / dip_gate
     u = min(60.0, e * e + c * c) * min(1.0, max(0.0, age / LEARN - 1.0))
     weight = math.exp(-u)
     k = weight * dt / min(age, window + dt)
