@@ -124,7 +124,7 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     if name[:1].isupper():
-        from northdown.estimators.base import find_class
+        from northdown.estimators import find_class
 
         estimator = find_class(name)
         if estimator is not None:

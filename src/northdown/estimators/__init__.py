@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from northdown.estimators.base import Estimator, Stream, get, registry
+from northdown.estimators._registry import find_class, get, registry
+from northdown.estimators._stream import Stream
+from northdown.estimators.base import Estimator
 
-__all__ = ["Estimator", "Stream", "get", "registry"]
+__all__ = ["Estimator", "Stream", "find_class", "get", "registry"]
