@@ -36,6 +36,7 @@ from northdown.recording import Recording
 
 # Share of points that must agree, and spread (relative) beyond which the field was not constant.
 _FEWEST_USED, _MOST_SPREAD = 0.6, 0.1
+_LEAST_SPREAD = 0.05  # below this share of its mean the field may as well be noise about one direction
 # 1-σ of the offset (relative to the field) from which on nothing is known.
 _HOPELESS = 0.3
 
@@ -83,6 +84,7 @@ def calibrate_magnetometer(
     if field is not None:
         field = check_number("field", field, above=0.0, unit=unit)
     points, rough = gather_points(recordings)
+    _check_turned(points)
     sphere = fit_sphere(points, rough)
     ellipsoid = fit_ellipsoid(points, sphere) if sphere and len(points) >= FEWEST_ELLIPSOID else None
     why_not = _why_not_ellipsoid(ellipsoid, tolerance, len(points))
@@ -92,6 +94,15 @@ def calibrate_magnetometer(
         raise InputError(refusal)
     _check_field(fitted, points)
     return Calibration(mag=_part(fitted, points, unit, field, why_not))
+
+
+def _check_turned(points: FloatArray) -> None:
+    """Refuse a sensor that lay still: a sphere would fit its noise."""
+    centre = points.mean(axis=0)
+    spread = float(np.sqrt(((points - centre) ** 2).sum(axis=1).mean()) / np.linalg.norm(centre))
+    if spread < _LEAST_SPREAD:
+        got = f"one that hardly turned: its field stays within {100.0 * spread:.1g} % of its mean"
+        raise InputError(expected("a magnetometer turned into directions all around", got, do=HOW))
 
 
 def _why_not_sphere(fitted: Fitted | None, tolerance: float, unit: str) -> str:
