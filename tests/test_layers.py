@@ -18,8 +18,8 @@ FILES = sorted(ROOT.rglob("*.py"))
 # Each part may import from those before it, and from itself.
 # fmt: off
 LAYERS = [
-    "errors", "_validation", "kernels", "frames", "orientation", "fields", "checks", "recording", "io", "datasets",
-    "estimators", "arrays", "calibration", "simulation", "evaluation", "plots", "report", "live", "cli",
+    "errors", "_validation", "kernels", "frames", "orientation", "fields", "arrays", "checks", "recording", "io",
+    "datasets", "estimators", "calibration", "simulation", "evaluation", "plots", "report", "live", "cli",
 ]
 # fmt: on
 

@@ -59,7 +59,7 @@ def same(a: Recording, b: Recording, atol: float = 0.0) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"gyr": None, "acc": None, "mag": None}, "at least one of gyr, acc and mag, got none"),
+        ({"gyr": None, "acc": None, "mag": None}, "at least one of gyr, acc, mag and array_acc, got none"),
         ({"gyr": np.zeros((3, N))}, "pass gyr.T"),
         ({"acc": np.zeros((N - 1, 3))}, "acc with 100 rows, one for each time, got 99 rows"),
         ({"mag": np.full((N, 3), np.inf)}, "finite numbers in mag, got infinity, at sample 0"),

@@ -73,6 +73,16 @@ def check_vectors(name: str, value: Any, length: int | None = None) -> FloatArra
     return array
 
 
+def check_channels(name: str, value: Any, shape: tuple[int, int]) -> FloatArray:
+    """Check an (N, K) array of float64, one column for each channel; NaN is allowed (no sample), infinity is not."""
+    array = as_float_array(name, value)
+    if array.shape != shape:
+        what = f"{name} of shape {shape}, a row for each time and a column for each accelerometer of the array"
+        raise InputError(expected(what, f"shape {array.shape}"))
+    check_no_infinity(name, array)
+    return array
+
+
 def check_no_infinity(name: str, array: FloatArray, *, at: int | None = None) -> None:
     """Raise when an array holds an infinite value; the first row is named unless `at` is given."""
     infinite = np.isinf(array)

@@ -12,6 +12,7 @@ from northdown._validation import (
     BoolArray,
     FloatArray,
     as_float_array,
+    check_channels,
     check_choice,
     check_index,
     check_mask,
@@ -19,6 +20,7 @@ from northdown._validation import (
     check_time,
     check_vectors,
 )
+from northdown.arrays import AccelerometerArray
 from northdown.checks import Findings, check_recording, sampling_step
 from northdown.errors import InputError, expected
 from northdown.frames import Frame, check_frame, mounting_matrix
@@ -57,6 +59,11 @@ class Recording:
         For tables and figures.
     mag_unit : {"uT", "arbitrary"}
         ``"arbitrary"`` when the field's size has no known unit; its direction is all that estimators need.
+    array : AccelerometerArray, optional
+        Geometry of an array of single-axis accelerometers; `array_acc` goes with it.
+    array_acc : (N, K) array, optional
+        Specific force that each of the array's K accelerometers measures along its direction, m/s². A row with NaN
+        means that there was no sample at that time.
     reference_offset : {"none", "heading", "rotations"}
         How the reference's axes differ from the sensor's by constant rotations: not at all, in heading only, or
         both the navigation and the body frame (to be found by alignment).
@@ -82,6 +89,8 @@ class Recording:
     name: str = ""
     mag_unit: Literal["uT", "arbitrary"] = "uT"
     reference_offset: ReferenceOffset = "none"
+    array: AccelerometerArray | None = None
+    array_acc: FloatArray | None = None
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -94,8 +103,12 @@ class Recording:
             value = getattr(self, sensor)
             if value is not None:
                 set_field(self, sensor, check_vectors(sensor, value, n))
-        if self.gyr is None and self.acc is None and self.mag is None:
-            raise InputError(expected("at least one of gyr, acc and mag", "none"))
+        if (self.array is None) != (self.array_acc is None):
+            raise InputError(expected("array and array_acc together", "one without the other"))
+        if self.array is not None and self.array_acc is not None:
+            set_field(self, "array_acc", check_channels("array_acc", self.array_acc, (n, len(self.array))))
+        if self.gyr is None and self.acc is None and self.mag is None and self.array is None:
+            raise InputError(expected("at least one of gyr, acc, mag and array_acc", "none"))
         if self.movement is not None:
             set_field(self, "movement", check_mask("movement", self.movement, n))
         if self.reference is not None and not isinstance(self.reference, Orientation):
@@ -106,7 +119,7 @@ class Recording:
 
     def __repr__(self) -> str:
         span = f"{self.duration:.1f} s at {self.rate:.1f} Hz" if self.rate > 0.0 else "no duration"
-        sensors = "+".join(s for s in SENSORS if getattr(self, s) is not None)
+        sensors = "+".join(s for s in (*SENSORS, "array") if getattr(self, s) is not None)
         tail = ", with reference" if self.reference is not None else ""
         return f"<Recording {self.name or 'unnamed'}: {len(self)} samples, {span}, {sensors}, {self.frame}{tail}>"
 
@@ -146,7 +159,8 @@ class Recording:
 
     def _select(self, index: Any) -> Recording:
         picked: dict[str, Any] = {
-            k: None if getattr(self, k) is None else getattr(self, k)[index] for k in (*SENSORS, "movement")
+            k: None if getattr(self, k) is None else getattr(self, k)[index]
+            for k in (*SENSORS, "array_acc", "movement")
         }
         return replace(self, time=self.time[index], **picked)
 
@@ -192,7 +206,8 @@ class Recording:
         reference = self.reference
         if reference is not None and self.reference_offset != "rotations":
             reference = reference.turned(right=Rotation.from_matrix(m).inv())
-        return replace(self, reference=reference, **turned)
+        array = None if self.array is None else self.array.turned(m)
+        return replace(self, reference=reference, array=array, **turned)
 
     def resample(self, rate: float) -> Recording:
         """Resample to a constant rate (Hz).
@@ -235,7 +250,7 @@ class Recording:
             angle = np.vstack([np.zeros(3), np.cumsum(self.gyr[1:] * dt[:, None], axis=0)])
             new = np.column_stack([np.interp(t, self.time, angle[:, i]) for i in range(3)])
             fields["gyr"] = np.vstack([self.gyr[:1], np.diff(new, axis=0) * rate])
-        for sensor in ("acc", "mag"):
+        for sensor in ("acc", "mag", "array_acc"):
             value = getattr(self, sensor)
             fields[sensor] = None if value is None else _interpolate(t, self.time, value, 1.0 / rate)
         movement = None if self.movement is None else np.interp(t, self.time, self.movement.astype(float)) > 0.5
@@ -245,11 +260,12 @@ class Recording:
 def _interpolate(t: FloatArray, time: FloatArray, value: FloatArray, period: float) -> FloatArray:
     """Linear interpolation between the samples that are there; NaN across long gaps."""
     there = ~np.isnan(value).any(axis=1)
-    result = np.full((len(t), 3), np.nan)
+    channels = value.shape[1]
+    result = np.full((len(t), channels), np.nan)
     if there.sum() < 2:
         return result
     known = time[there]
-    for i in range(3):
+    for i in range(channels):
         result[:, i] = np.interp(t, known, value[there, i], left=np.nan, right=np.nan)
     right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
     left = right - 1
