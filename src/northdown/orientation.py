@@ -46,6 +46,8 @@ class Flag(enum.IntFlag):
     """The field departed so far from its reference that the sample was given less than 1 % of its weight."""
     NEAR_SINGULAR = 32
     """The attitude is near one in which the method's angles are undefined; do not trust it."""
+    ACC_REJECTED = 64
+    """Linear acceleration is so strong that the accelerometer's sample was given less than a tenth of its weight."""
 
 
 @dataclass(frozen=True, eq=False)

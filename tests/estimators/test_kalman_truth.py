@@ -153,7 +153,7 @@ def predict7(f, noise, q, b, P, gyr, dt):
     turn = wxyz(Rotation.from_rotvec((gyr - b) * dt))
     F = np.eye(7)
     F[:4, :4] = np.array([product(e, turn) for e in np.eye(4)]).T
-    F[:4, 4:] = -0.5 * dt * np.array([product(q, np.concatenate([[0.0], e])) for e in np.eye(3)]).T
+    F[:4, 4:] = -0.5 * dt * np.array([product(product(q, np.concatenate([[0.0], e])), turn) for e in np.eye(3)]).T
     Q = block_diag(0.25 * noise.gyr(gyr - b, dt) * np.eye(4), f.gyr_bias_walk**2 * dt * np.eye(3))
     return product(q, turn), F @ P @ F.T + Q
 
@@ -430,6 +430,29 @@ def test_rejected_field_is_flagged_with_its_statistic():
         assert np.array_equal(result.has(nd.Flag.MAG_REJECTED), disturbed), name
         assert np.array_equal(result.diagnostics["field_departure"] > 4.6, disturbed), name
         assert np.rad2deg(np.abs(result.as_euler()[:, 2]).max()) < 0.1, name
+
+
+def test_strong_acceleration_is_flagged_with_its_statistic():
+    # at rest but for 15 m/s² straight up from 1 s to 2 s, which tilts nothing
+    n, dt, window = 400, 0.01, 0.5
+    t = np.arange(n) * dt
+    accelerating = (t > 0.995) & (t < 1.995)
+    acc = np.tile([0.0, 0.0, -9.80665], (n, 1))
+    acc[accelerating, 2] -= 15.0
+    acc[1::2] = np.nan
+    recording = nd.Recording(t, np.zeros((n, 3)), acc, np.tile([20.0, 0.0, 45.0], (n, 1)))
+    # each sample stands for 2 dt; a low pass of the square, by hand
+    expected, mean = np.zeros(n), 0.0
+    for k in range(2, n):
+        if k % 2 == 0:
+            mean += (225.0 * accelerating[k] - mean) * 2 * dt / window
+        expected[k] = math.sqrt(mean)
+    for name in ("mekf", "quaternion-ekf", "double-stage-ekf", "euler-ukf", "gyro-euler-ekf"):
+        result = get(name)(motion_window=window, acc_noise=0.4, motion_time=0.02).run(recording)
+        assert np.abs(result.diagnostics["acceleration"] - expected).max() < 1e-9, name
+        flagged = (expected > 3.0 * 0.4 / math.sqrt(0.02)) & (np.arange(n) % 2 == 0)
+        assert 20 < flagged.sum() < 80, name
+        assert np.array_equal(result.has(nd.Flag.ACC_REJECTED), flagged), name
 
 
 def test_covariance_turns_with_the_frame(recording):

@@ -7,10 +7,17 @@ says on data of known noise, give the sensor's own figures and set `gyr_scale` a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from northdown.estimators.base import Estimator, parameter
+from northdown.kernels.jit import inline
+from northdown.kernels.weighting import ACCELERATING, REJECTED
+from northdown.orientation import Flag
+
+_ACC_REJECTED = int(Flag.ACC_REJECTED)
+_MAG_REJECTED = int(Flag.MAG_REJECTED)
 
 
 class NoiseTerms(NamedTuple):
@@ -30,6 +37,28 @@ class NoiseTerms(NamedTuple):
     tilt: float
     heading: float
     bias: float
+
+
+@inline
+def start_covariance(p: Any, heading_known: bool) -> Any:
+    """Upper triangle of P for a fresh attitude; an unknown heading is uniform over the circle."""
+    tilt, heading, bias = p[11], p[12], p[13]
+    if not heading_known:
+        heading = math.pi * math.pi / 3.0
+    zero3, zero2 = (0.0, 0.0, 0.0), (0.0, 0.0)
+    rows = (tilt, 0.0, 0.0) + zero3 + (tilt, 0.0) + zero3 + (heading,) + zero3
+    return rows + (bias,) + zero2 + (bias, 0.0, bias)
+
+
+@inline
+def weighting_flags(acc_var: float, motion_time: float, motion: float, age_acc: float, u: float) -> int:
+    """Flags of a sample, from the mean square of linear acceleration, the accelerometer's age and the field's u."""
+    flags = 0
+    if age_acc == 0.0 and motion_time * motion > ACCELERATING * acc_var:
+        flags = _ACC_REJECTED
+    if u > REJECTED:
+        flags |= _MAG_REJECTED
+    return flags
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +100,17 @@ class KalmanFilter(Estimator):
         bad start and more nervously from a good one.
     start_heading : float
         The same about the vertical. Raising it turns faster to the magnetometer's north at first.
+
+    Notes
+    -----
+    What lowered the weight of a sample is told with it: `Orientation.diagnostics` holds the statistics, `flags` what
+    passed the threshold.
+
+    - ``acceleration``: rms of linear acceleration over `motion_window`, m/s². Above 3 acc_noise / √motion_time
+      (8.7 m/s² at the defaults) the accelerometer's sample has less than a tenth of its weight at rest:
+      `Flag.ACC_REJECTED`.
+    - ``field_departure``: u of the field's norm and dip, see `mekf`; 0 for a sample without field. Above 4.6 the
+      magnetometer's sample has less than 1 % of its weight: `Flag.MAG_REJECTED`.
     """
 
     gyr_noise: float = parameter(0.01, unit="rad/s/√Hz", above=0.0)

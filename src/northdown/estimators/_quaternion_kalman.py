@@ -1,8 +1,17 @@
-"""What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
+r"""What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
 
-State tuple: quaternion 4, bias 3, P 28 (of (e, bias) with δq = e ⊗ q, see `kernels.quaternion_kalman`), mean square
+State tuple: quaternion 4, bias 3, variance of e₀, P 21 of (δ, bias) (see `kernels.quaternion_kalman`), mean square
 of linear acceleration, ages of acc and mag, field's horizontal and down part and age, departure u of the last field
 sample.
+
+The step from q to q' = q ⊗ exp((ω − b) Δt) leaves e of δq = e ⊗ q as it is, but for the bias. Its derivative by b is
+taken as
+
+.. math::  -\tfrac{\Delta t}{2}\, q \otimes (0, e_j) \otimes \exp\bigl((\omega - b) \Delta t\bigr)
+           = -\tfrac{\Delta t}{2}\, (0, R_{nb} e_j) \otimes q'
+
+Textbooks leave out the last factor; to first order in Δt that is the same. With it the derivative, like the exact
+one, changes no norm: e₀ stays uncorrelated with all else.
 """
 
 from __future__ import annotations
@@ -13,52 +22,52 @@ from dataclasses import dataclass
 from typing import Any
 
 from northdown._validation import FloatArray
-from northdown.estimators._kalman import BiasKalmanFilter
+from northdown.estimators._kalman import BiasKalmanFilter, start_covariance, weighting_flags
 from northdown.frames import Frame
 from northdown.kernels.jit import inline
-from northdown.kernels.quaternion import dot, multiply, normalize
-from northdown.kernels.quaternion_kalman import attitude_covariance, propagate_quaternion_bias, quaternion_covariance
+from northdown.kernels.kalman import propagate_attitude_bias, symmetric3
+from northdown.kernels.quaternion import dot, multiply, normalize, scaled_axes
 from northdown.kernels.so3 import exp
-from northdown.kernels.weighting import REJECTED
-from northdown.orientation import Flag
 
-N_STATE = 42
-N_OUT = 20
-
-_MAG_REJECTED = int(Flag.MAG_REJECTED)
+N_STATE = 36
+N_OUT = 21
 
 
 @inline
-def predict(p: Any, q: Any, b: Any, cov: Any, gyr: Any, dt: float) -> Any:
-    """Attitude and covariance after a step with the rate gyr − b: returns (q, P)."""
+def predict(p: Any, q: Any, b: Any, along: float, cov: Any, gyr: Any, dt: float) -> Any:
+    """Attitude and covariance after a step with the rate gyr − b: returns (q, variance of e₀, P)."""
     rate = (gyr[0] - b[0], gyr[1] - b[1], gyr[2] - b[2])
     if dt > 0.0:
-        turn = exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))
-        noise = 0.25 * (p[0] + p[1] * dot(rate, rate)) * dt
-        after = normalize(multiply(q, turn))
-        cov = propagate_quaternion_bias(cov, q, after, dt, noise, p[2] * dt)
-        q = after
-    return q, cov
+        noise = (p[0] + p[1] * dot(rate, rate)) * dt
+        along += 0.25 * noise
+        cov = propagate_attitude_bias(cov, scaled_axes(dt, q), noise, p[2] * dt)
+        q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
+    return q, along, cov
+
+
+@inline
+def start(p: Any, heading_known: bool) -> Any:
+    """Variance of e₀ and P for a fresh attitude; the former a hundredth of the smaller of the latter's."""
+    return (0.0025 * min(p[11], p[12]),) + start_covariance(p, heading_known)
 
 
 @inline
 def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
-    """State for an attitude found from the sensors; an unknown heading is uniform over the circle."""
-    heading = p[12] if heading_known else math.pi * math.pi / 3.0
-    return q + s[4:7] + quaternion_covariance(p[11], heading, p[13]) + s[35:]
+    """State for an attitude found from the sensors."""
+    return q + s[4:7] + start(p, heading_known) + s[29:]
 
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u."""
-    sigma = (math.sqrt(s[29]), math.sqrt(s[32]), math.sqrt(s[34]))
-    return s[:7] + attitude_covariance(s[7:35]) + sigma + (s[41],)
+    """Attitude, bias, covariance of the attitude, sigma of the bias, rms linear acceleration, field's departure u."""
+    sigma = (math.sqrt(s[23]), math.sqrt(s[26]), math.sqrt(s[28]))
+    return s[:7] + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + sigma + (math.sqrt(s[29]), s[35])
 
 
 @inline
 def flagged(p: Any, s: Any) -> int:
-    """Whether the magnetometer's sample was all but rejected."""
-    return _MAG_REJECTED if s[41] > REJECTED else 0
+    """Whether linear acceleration or a disturbed field has lowered the weight of this sample."""
+    return weighting_flags(p[3], p[4], s[29], s[30], s[35])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,10 +78,9 @@ class QuaternionKalmanFilter(BiasKalmanFilter):
         "gyr_bias": slice(4, 7),
         "covariance": slice(7, 16),
         "gyr_bias_sigma": slice(16, 19),
-        "field_departure": slice(19, 20),
+        "acceleration": slice(19, 20),
+        "field_departure": slice(20, 21),
     }
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
-        noise = self._bias_noise()
-        covariance = quaternion_covariance(noise.tilt, noise.heading, noise.bias)
-        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)
+        return (0.0, 0.0, 0.0, *start(self._bias_noise(), True), *(0.0,) * 7)

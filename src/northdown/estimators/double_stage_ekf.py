@@ -23,6 +23,9 @@ navigation frame. With δq = ½ (0, δ) ⊗ q they are: ``isolation="navigation"
 rotation δ about north, east and down, δ_j = 2 ⟨(0, e_j) ⊗ q, ε⟩, and drops δ_down in stage 1, δ_north and δ_east in
 stage 2. That is exact to first order in every attitude and in every mounting.
 
+L_k is taken at the end of the step, times exp((ω − b) Δt) from the right: the same to first order, and it does not
+mix the quaternion's length with the rest.
+
 As in `quaternion_ekf`, P belongs to the error e of (1 + e) ⊗ q and stays as it is when q moves; its docstring says
 why.
 
@@ -55,70 +58,70 @@ from northdown.estimators._quaternion_kalman import (
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.quaternion import conjugate, down_b, multiply, normalize, rotate, unit
+from northdown.kernels.quaternion import conjugate, dot, multiply, normalize, rotate
 from northdown.kernels.quaternion_kalman import correct_field, correct_up
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
-from northdown.kernels.wahba import has_heading
+from northdown.kernels.wahba import has_horizontal
 from northdown.kernels.weighting import field_departure, linear_acceleration
-from northdown.orientation import Flag
-
-_MAG_REJECTED = int(Flag.MAG_REJECTED)
 
 
 @inline
-def tilt_only(q: Any, e: Any, additive: float) -> Any:
-    """What stage 1 may change of the correction δq = e ⊗ q, as a turn from the left."""
+def tilt_only(q: Any, scale: float, d: Any, additive: float) -> Any:
+    """What stage 1 may change of the correction δq = (scale, ½ d) ⊗ q, as a turn from the left."""
     if additive != 0.0:
-        d = multiply(e, q)
-        return multiply(normalize((q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3])), conjugate(q))
-    return exp((2.0 * e[1], 2.0 * e[2], 0.0))
+        e = multiply((scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q)
+        return multiply(normalize((q[0] + e[0], q[1] + e[1], q[2] + e[2], q[3])), conjugate(q))
+    return exp((d[0], d[1], 0.0))
 
 
 @inline
-def heading_only(q: Any, e: Any, additive: float) -> Any:
+def heading_only(q: Any, scale: float, d: Any, additive: float) -> Any:
     """What stage 2 may change, likewise."""
     if additive != 0.0:
-        d = multiply(e, q)
-        return multiply(normalize((q[0] + d[0], q[1], q[2], q[3] + d[3])), conjugate(q))
-    return exp((0.0, 0.0, 2.0 * e[3]))
+        e = multiply((scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q)
+        return multiply(normalize((q[0] + e[0], q[1], q[2], q[3] + e[3])), conjugate(q))
+    return exp((0.0, 0.0, d[2]))
 
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
+    """One sample; the state is that of `_quaternion_kalman`."""
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
     additive, bias_update = p[14], p[15]
     q, b = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6])
-    cov = s[7:35]
-    motion, age_acc, age_mag = s[35], s[36] + dt, s[37] + dt
-    field = (s[38], s[39], s[40])
+    along, cov = s[7], s[8:29]
+    motion, age_acc, age_mag = s[29], s[30] + dt, s[31] + dt
+    field = (s[32], s[33], s[34])
     u = 0.0
 
-    q, cov = predict(p, q, b, cov, gyr, dt)
+    q, along, cov = predict(p, q, b, along, cov, gyr, dt)
 
-    nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if is_sample(acc) and age_acc > 0.0:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
-        cov, d = correct_up(cov, nothing, (force[0] / g, force[1] / g, force[2] / g + 1.0), r)
-        turn = tilt_only(q, (d[0], d[1], d[2], d[3]), additive)
-        q = normalize(multiply(turn, q))
-        b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
+        k = 1.0 / g
+        up = (k * force[0], k * force[1], k * force[2] + 1.0)
+        along, cov, scale, d = correct_up(along, cov, nothing, up, r)
+        turn = tilt_only(q, scale, d, additive)
+        q = multiply(turn, q)
+        b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_acc = 0.0
-    if has_heading(down_b(q), mag) and age_mag > 0.0:
-        h = rotate(q, mag)
+    h = rotate(q, mag)
+    if has_horizontal(h) and age_mag > 0.0:
         u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
-        h = unit(h)
-        north = math.sqrt(h[0] * h[0] + h[1] * h[1])
+        horizontal = math.sqrt(h[0] * h[0] + h[1] * h[1])
+        k = 1.0 / math.sqrt(dot(h, h))
+        h, north = (k * h[0], k * h[1], k * h[2]), k * horizontal
         r = mag_var / (weight * age_mag)
-        cov, d = correct_field(cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
-        turn = heading_only(q, (d[0], d[1], d[2], d[3]), additive)
-        q = normalize(multiply(turn, q))
-        b = (b[0] + bias_update * d[4], b[1] + bias_update * d[5], b[2] + bias_update * d[6])
+        along, cov, scale, d = correct_field(along, cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
+        turn = heading_only(q, scale, d, additive)
+        q = multiply(turn, q)
+        b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_mag = 0.0
-    return q + b + cov + (motion, age_acc, age_mag) + field + (u,)
+    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u,)
 
 
 @dataclass(frozen=True, kw_only=True)

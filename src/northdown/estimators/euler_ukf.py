@@ -43,7 +43,7 @@ from typing import Any, Literal
 import numpy as np
 
 from northdown._validation import FloatArray
-from northdown.estimators._kalman import KalmanFilter
+from northdown.estimators._kalman import KalmanFilter, weighting_flags
 from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels import euler
@@ -53,10 +53,9 @@ from northdown.kernels.kalman import symmetric3
 from northdown.kernels.quaternion import dot, multiply, rotate, unit
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
-from northdown.kernels.weighting import REJECTED, field_departure, field_direction, linear_acceleration
+from northdown.kernels.weighting import field_departure, field_direction, linear_acceleration
 from northdown.orientation import Flag
 
-_MAG_REJECTED = int(Flag.MAG_REJECTED)
 _NEAR_SINGULAR = int(Flag.NEAR_SINGULAR)
 _HALF = math.sqrt(0.5)
 _FLOOR = 1e-18  # rad²: keeps a pivot lost to rounding positive
@@ -285,7 +284,7 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, covariance of its rotation vector in navigation axes, field's departure u.
+    """Attitude, covariance of its rotation vector in navigation axes, rms linear acceleration, field's departure u.
 
     δ = J (dφ, dθ, dψ) with the columns of J (cos ψ cos θ, sin ψ cos θ, −sin θ), (−sin ψ, cos ψ, 0), (0, 0, 1).
     """
@@ -299,13 +298,13 @@ def output(p: Any, s: Any) -> Any:
     z0 = p02 - sp * p00
     c00, c01, c11 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1, u1 * a1 + v1 * b1
     c02, c12 = w0 - sp * u0, w1 - sp * u1
-    return s[:4] + symmetric3(c00, c01, c02, c11, c12, w2 - sp * z0) + (s[19],)
+    return s[:4] + symmetric3(c00, c01, c02, c11, c12, w2 - sp * z0) + (math.sqrt(s[13]), s[19])
 
 
 @inline
 def flagged(p: Any, s: Any) -> int:
-    """Whether the magnetometer's sample was all but rejected, and whether pitch is near ±90°."""
-    flags = _MAG_REJECTED if s[19] > REJECTED else 0
+    """What has lowered the weight of this sample, and whether pitch is near ±90°."""
+    flags = weighting_flags(p[2], p[3], s[13], s[14], s[19])
     if math.fabs(s[5]) > p[18]:
         flags |= _NEAR_SINGULAR
     return flags
@@ -343,13 +342,17 @@ class EulerUKF(KalmanFilter):
         step,
         n_params=19,
         n_state=20,
-        n_out=14,
+        n_out=15,
         output=output,
         aligned=aligned,
         flagged=flagged,
         covariance=4,
     )
-    outputs = {"covariance": slice(4, 13), "field_departure": slice(13, 14)}  # noqa: RUF012  (constant)
+    outputs = {  # noqa: RUF012  (a constant of the class)
+        "covariance": slice(4, 13),
+        "acceleration": slice(13, 14),
+        "field_departure": slice(14, 15),
+    }
     singular = "pitch ±90°"
 
     dip: float | None = parameter(None, unit="rad", low=-1.56, high=1.56)

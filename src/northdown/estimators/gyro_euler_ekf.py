@@ -28,13 +28,13 @@ from typing import Any
 
 from northdown._validation import FloatArray
 from northdown.estimators._kalman import KalmanFilter
-from northdown.estimators._quaternion_kalman import N_STATE, aligned, flagged, predict
+from northdown.estimators._quaternion_kalman import N_STATE, aligned, flagged, predict, start
 from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.jit import inline
+from northdown.kernels.kalman import correct6, symmetric3
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
-from northdown.kernels.quaternion_kalman import attitude_covariance, correct7, quaternion_covariance
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 from northdown.kernels.weighting import field_departure, linear_acceleration
@@ -47,44 +47,41 @@ _NEAR_SINGULAR = int(Flag.NEAR_SINGULAR)
 def correct_angles(p: Any, angles: Any, residual: Any, r: Any) -> Any:
     """Three scalar updates with roll, pitch and yaw; returns (P, correction).
 
-    With δq = e ⊗ q and δ = 2 (e₁, e₂, e₃): δφ = (cos ψ δ_x + sin ψ δ_y) / cos θ, δθ = cos ψ δ_y − sin ψ δ_x,
-    δψ = δ_z + sin θ δφ.
+    δφ = (cos ψ δ_x + sin ψ δ_y) / cos θ, δθ = cos ψ δ_y − sin ψ δ_x, δψ = δ_z + sin θ δφ.
     """
     sp, cp = math.sin(angles[1]), math.cos(angles[1])
-    sy, cy = 2.0 * math.sin(angles[2]), 2.0 * math.cos(angles[2])
-    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    sy, cy = math.sin(angles[2]), math.cos(angles[2])
+    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     p, d = correct_rotation(p, d, (cy / cp, sy / cp, 0.0), residual[0], r[0])
     p, d = correct_rotation(p, d, (-sy, cy, 0.0), residual[1], r[1])
-    return correct_rotation(p, d, (sp * cy / cp, sp * sy / cp, 2.0), residual[2], r[2])
+    return correct_rotation(p, d, (sp * cy / cp, sp * sy / cp, 1.0), residual[2], r[2])
 
 
 @inline
 def correct_rotation(p: Any, d: Any, h: Any, residual: float, r: float) -> Any:
-    """Scalar update with h₀ e₁ + h₁ e₂ + h₂ e₃."""
+    """Scalar update with h · δ."""
     a, b, c = h
     ph = (
-        a * p[1] + b * p[2] + c * p[3],
-        a * p[7] + b * p[8] + c * p[9],
-        a * p[8] + b * p[13] + c * p[14],
-        a * p[9] + b * p[14] + c * p[18],
-        a * p[10] + b * p[15] + c * p[19],
-        a * p[11] + b * p[16] + c * p[20],
-        a * p[12] + b * p[17] + c * p[21],
+        a * p[0] + b * p[1] + c * p[2],
+        a * p[1] + b * p[6] + c * p[7],
+        a * p[2] + b * p[7] + c * p[11],
+        a * p[3] + b * p[8] + c * p[12],
+        a * p[4] + b * p[9] + c * p[13],
+        a * p[5] + b * p[10] + c * p[14],
     )
-    s = a * ph[1] + b * ph[2] + c * ph[3] + r
-    return correct7(p, d, ph, s, residual - (a * d[1] + b * d[2] + c * d[3]))
+    s = a * ph[0] + b * ph[1] + c * ph[2] + r
+    return correct6(p, d, ph, s, residual - (a * d[0] + b * d[1] + c * d[2]))
 
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     """One sample; the state is that of `_quaternion_kalman` with a bias of zero and of zero variance."""
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
-    cov = s[7:35]
-    motion, age = s[35], s[36] + dt
-    field = (s[38], s[39], s[40])
+    motion, age = s[29], s[30] + dt
+    field = (s[32], s[33], s[34])
     u = 0.0
 
-    q, cov = predict(p, (s[0], s[1], s[2], s[3]), (0.0, 0.0, 0.0), cov, gyr, dt)
+    q, along, cov = predict(p, (s[0], s[1], s[2], s[3]), (0.0, 0.0, 0.0), s[7], s[8:29], gyr, dt)
 
     if age > 0.0 and dot(acc, acc) > 0.0 and has_heading(acc, mag):
         level = multiply(tilt_correction(q, acc), q)
@@ -106,21 +103,21 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
                 euler.wrap(measured[2] - angles[2]),
             )
             cov, d = correct_angles(cov, angles, residual, r)
-            q = normalize(multiply((1.0 + d[0], d[1], d[2], d[3]), q))
+            q = normalize(multiply((1.0, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q))
         age = 0.0
-    return q + (0.0, 0.0, 0.0) + cov + (motion, age, 0.0) + field + (u,)
+    return q + (0.0, 0.0, 0.0) + (along,) + cov + (motion, age, 0.0) + field + (u,)
 
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, covariance of its rotation vector in navigation axes, field's departure u."""
+    """Attitude, its covariance, rms linear acceleration, field's departure u."""
     q = (s[0], s[1], s[2], s[3])
-    return q + attitude_covariance(s[7:35]) + (s[41],)
+    return q + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + (math.sqrt(s[29]), s[35])
 
 
 @inline
 def flags(p: Any, s: Any) -> int:
-    """Whether the magnetometer's sample was all but rejected, and whether pitch is near ±90°."""
+    """What has lowered the weight of this sample, and whether pitch is near ±90°."""
     down = down_b((s[0], s[1], s[2], s[3]))
     return flagged(p, s) | (_NEAR_SINGULAR if math.fabs(down[0]) > math.sin(p[14]) else 0)
 
@@ -147,13 +144,17 @@ class GyroEulerEKF(KalmanFilter):
         step,
         n_params=15,
         n_state=N_STATE,
-        n_out=14,
+        n_out=15,
         output=output,
         aligned=aligned,
         flagged=flags,
         covariance=4,
     )
-    outputs = {"covariance": slice(4, 13), "field_departure": slice(13, 14)}  # noqa: RUF012  (constant)
+    outputs = {  # noqa: RUF012  (a constant of the class)
+        "covariance": slice(4, 13),
+        "acceleration": slice(13, 14),
+        "field_departure": slice(14, 15),
+    }
     singular = "pitch ±90°"
 
     singular_pitch: float = parameter(1.4, unit="rad", low=0.0, high=1.5708)
@@ -162,6 +163,4 @@ class GyroEulerEKF(KalmanFilter):
         return (*self._noise(), self.singular_pitch)
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
-        noise = self._noise()
-        covariance = quaternion_covariance(noise.tilt, noise.heading, 0.0)
-        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)
+        return (0.0, 0.0, 0.0, *start(self._noise(), True), *(0.0,) * 7)

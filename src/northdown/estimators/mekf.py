@@ -17,7 +17,8 @@ suggests:
 .. math::  R_a = \bigl(\sigma_a^2 + \tau_m\, \overline{\lVert f_n - (0,0,-g) \rVert^2}\bigr) / (g^2\, \Delta t)
 
 with the mean taken over `motion_window` seconds and τ_m (`motion_time`) the time over which accelerations stay
-correlated.
+correlated. Where that leaves less than a tenth of the weight at rest (9 σ_a² < τ_m mean), samples carry the flag
+`ACC_REJECTED`.
 
 Magnetometer: the heading ε = atan2(h_y, h_x) of h = R̂ m_b, one scalar:
 
@@ -44,53 +45,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from northdown._validation import FloatArray
-from northdown.estimators._kalman import BiasKalmanFilter
+from northdown.estimators._kalman import BiasKalmanFilter, start_covariance, weighting_flags
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import propagate_attitude_bias, reduce6, symmetric3
-from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
+from northdown.kernels.kalman import correct_north_down, correct_tilt, propagate_attitude_bias, symmetric3
+from northdown.kernels.quaternion import dot, multiply, normalize, rotate, scaled_axes
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
-from northdown.kernels.wahba import has_heading
-from northdown.kernels.weighting import REJECTED, field_departure, linear_acceleration
-from northdown.orientation import Flag
-
-_MAG_REJECTED = int(Flag.MAG_REJECTED)
-
-
-@inline
-def correct_tilt(p: Any, d: Any, force: Any, r: float) -> Any:
-    """Two scalar updates with the horizontal specific force in units of g; returns (P, correction)."""
-    # f_x = δ_y
-    k = 1.0 / (p[6] + r)
-    y = (force[0] - d[1]) * k
-    h = (p[1], p[6], p[7], p[8], p[9], p[10])
-    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
-    p = reduce6(p, h, k)
-    # f_y = −δ_x; with h = P[:, 0] the two minus signs cancel in the covariance
-    k = 1.0 / (p[0] + r)
-    y = -(force[1] + d[0]) * k
-    h = (p[0], p[1], p[2], p[3], p[4], p[5])
-    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
-    return reduce6(p, h, k), d
-
-
-@inline
-def correct_heading(p: Any, d: Any, heading: float, slope: float, r: float) -> Any:
-    """Scalar update with ε = slope δ_x − δ_z; returns (P, correction)."""
-    h = (
-        slope * p[0] - p[2],
-        slope * p[1] - p[7],
-        slope * p[2] - p[11],
-        slope * p[3] - p[12],
-        slope * p[4] - p[13],
-        slope * p[5] - p[14],
-    )
-    k = 1.0 / (slope * h[0] - h[2] + r)
-    y = (heading - (slope * d[0] - d[2])) * k
-    d = (d[0] + h[0] * y, d[1] + h[1] * y, d[2] + h[2] * y, d[3] + h[3] * y, d[4] + h[4] * y, d[5] + h[5] * y)
-    return reduce6(p, h, k), d
+from northdown.kernels.wahba import has_horizontal
+from northdown.kernels.weighting import field_departure, linear_acceleration
 
 
 @inline
@@ -108,19 +72,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
     rate = (gyr[0] - bx, gyr[1] - by, gyr[2] - bz)
     if dt > 0.0:
-        w, x, y, z = q
-        a = (
-            dt * (1.0 - 2.0 * (y * y + z * z)),
-            dt * 2.0 * (x * y - w * z),
-            dt * 2.0 * (x * z + w * y),
-            dt * 2.0 * (x * y + w * z),
-            dt * (1.0 - 2.0 * (x * x + z * z)),
-            dt * 2.0 * (y * z - w * x),
-            dt * 2.0 * (x * z - w * y),
-            dt * 2.0 * (y * z + w * x),
-            dt * (1.0 - 2.0 * (x * x + y * y)),
+        cov = propagate_attitude_bias(
+            cov, scaled_axes(dt, q), (gyr_var + scale_var * dot(rate, rate)) * dt, walk_var * dt
         )
-        cov = propagate_attitude_bias(cov, a, (gyr_var + scale_var * dot(rate, rate)) * dt, walk_var * dt)
         q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
 
     d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -130,26 +84,15 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
         cov, d = correct_tilt(cov, d, (f[0] / g, f[1] / g), r)
         age_acc = 0.0
-    if has_heading(down_b(q), mag) and age_mag > 0.0:
-        h = rotate(q, mag)
+    h = rotate(q, mag)
+    if has_horizontal(h) and age_mag > 0.0:
         u, weight, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
         square = h[0] * h[0] + h[1] * h[1]
         r = mag_var * (1.0 + h[2] * h[2] / square) / (weight * age_mag)
-        cov, d = correct_heading(cov, d, math.atan2(h[1], h[0]), h[2] / math.sqrt(square), r)
+        cov, d = correct_north_down(cov, d, h[2] / math.sqrt(square), -1.0, math.atan2(h[1], h[0]), r)
         age_mag = 0.0
-    q = normalize(multiply(exp((d[0], d[1], d[2])), q))
+    q = multiply(exp((d[0], d[1], d[2])), q)  # of unit norm, and normalised at the next step
     return q + (bx + d[3], by + d[4], bz + d[5]) + cov + (motion, age_acc, age_mag) + field + (u,)
-
-
-@inline
-def start_covariance(p: Any, heading_known: bool) -> Any:
-    """Upper triangle of P for a fresh attitude; an unknown heading is uniform over the circle."""
-    tilt, heading, bias = p[11], p[12], p[13]
-    if not heading_known:
-        heading = math.pi * math.pi / 3.0
-    zero3, zero2 = (0.0, 0.0, 0.0), (0.0, 0.0)
-    rows = (tilt, 0.0, 0.0) + zero3 + (tilt, 0.0) + zero3 + (heading,) + zero3
-    return rows + (bias,) + zero2 + (bias, 0.0, bias)
 
 
 @inline
@@ -160,15 +103,15 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, rms linear acceleration, field's departure u."""
     sigma = (math.sqrt(s[22]), math.sqrt(s[25]), math.sqrt(s[27]))
-    return s[:7] + symmetric3(s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (s[34],)
+    return s[:7] + symmetric3(s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (math.sqrt(s[28]), s[34])
 
 
 @inline
 def flagged(p: Any, s: Any) -> int:
-    """Whether the magnetometer's sample was all but rejected."""
-    return _MAG_REJECTED if s[34] > REJECTED else 0
+    """Whether linear acceleration or a disturbed field has lowered the weight of this sample."""
+    return weighting_flags(p[3], p[4], s[28], s[29], s[34])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,13 +125,14 @@ class MEKF(BiasKalmanFilter):
 
     name = "mekf"
     kernel = Kernel(
-        "mekf", step, n_params=14, n_state=35, n_out=20, output=output, aligned=aligned, flagged=flagged, covariance=7
+        "mekf", step, n_params=14, n_state=35, n_out=21, output=output, aligned=aligned, flagged=flagged, covariance=7
     )
     outputs = {  # noqa: RUF012  (a constant of the class)
         "gyr_bias": slice(4, 7),
         "covariance": slice(7, 16),
         "gyr_bias_sigma": slice(16, 19),
-        "field_departure": slice(19, 20),
+        "acceleration": slice(19, 20),
+        "field_departure": slice(20, 21),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:

@@ -54,22 +54,19 @@ from northdown.kernels.quaternion import dot, multiply, normalize, rotate, unit
 from northdown.kernels.quaternion_kalman import correct_both, correct_field, correct_up
 from northdown.kernels.runner import Kernel
 from northdown.kernels.weighting import field_departure, field_direction, linear_acceleration
-from northdown.orientation import Flag
-
-_MAG_REJECTED = int(Flag.MAG_REJECTED)
 
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
+    """One sample; the state is that of `_quaternion_kalman`."""
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
     q, b = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6])
-    cov = s[7:35]
-    motion, age_acc, age_mag = s[35], s[36] + dt, s[37] + dt
-    field = (s[38], s[39], s[40])
+    along, cov = s[7], s[8:29]
+    motion, age_acc, age_mag = s[29], s[30] + dt, s[31] + dt
+    field = (s[32], s[33], s[34])
     u = 0.0
 
-    q, cov = predict(p, q, b, cov, gyr, dt)
+    q, along, cov = predict(p, q, b, along, cov, gyr, dt)
 
     has_acc = is_sample(acc) and age_acc > 0.0
     has_mag = dot(mag, mag) > 0.0 and age_mag > 0.0
@@ -93,16 +90,17 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r_mag = mag_var / (weight * age_mag)
         age_mag = 0.0
 
-    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    scale, d = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if has_acc and has_mag:
-        cov, d = correct_both(cov, d, up, r_acc, h, north, down, r_mag)
+        along, cov, scale, d = correct_both(along, cov, d, up, r_acc, h, north, down, r_mag)
     elif has_acc:
-        cov, d = correct_up(cov, d, up, r_acc)
+        along, cov, scale, d = correct_up(along, cov, d, up, r_acc)
     elif has_mag:
-        cov, d = correct_field(cov, d, h, north, down, r_mag)
+        along, cov, scale, d = correct_field(along, cov, d, h, north, down, r_mag)
     # P stays as it is while q moves: see the deviations above
-    q = normalize(multiply((1.0 + d[0], d[1], d[2], d[3]), q))
-    return q + (b[0] + d[4], b[1] + d[5], b[2] + d[6]) + cov + (motion, age_acc, age_mag) + field + (u,)
+    q = normalize(multiply((1.0 + scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q))
+    b = (b[0] + d[3], b[1] + d[4], b[2] + d[5])
+    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u,)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,8 @@
 A covariance is the tuple of its upper triangle by rows. With ph = P Hᵀ for one scalar measurement of variance r and
 s = H P Hᵀ + r, the update is x + ph (y / s), P − ph phᵀ / s. Vector measurements with uncorrelated noise are taken
 one component after the other, which is the same thing and needs no matrix inverse.
+
+Covariances of size six are those of the attitude error δ in navigation axes and of the gyroscope's bias.
 """
 
 from __future__ import annotations
@@ -42,6 +44,58 @@ def reduce6(p: Any, h: Any, inverse_s: float) -> Any:
         p45 - k4 * h5,
         p55 - k5 * h5,
     )
+
+
+@inline
+def correct6(p: Any, d: Any, ph: Any, s: float, y: float) -> Any:
+    """One scalar update from ph = P Hᵀ, s = H P Hᵀ + r and the residual y at the point reached.
+
+    d is the correction gathered so far. Returns (P, d).
+    """
+    k = 1.0 / s
+    g = y * k
+    d = (
+        d[0] + g * ph[0],
+        d[1] + g * ph[1],
+        d[2] + g * ph[2],
+        d[3] + g * ph[3],
+        d[4] + g * ph[4],
+        d[5] + g * ph[5],
+    )
+    return reduce6(p, ph, k), d
+
+
+@inline
+def correct_north(p: Any, d: Any, y: float, r: float) -> Any:
+    """Scalar update with δ_x."""
+    return correct6(p, d, (p[0], p[1], p[2], p[3], p[4], p[5]), p[0] + r, y - d[0])
+
+
+@inline
+def correct_east(p: Any, d: Any, y: float, r: float) -> Any:
+    """Scalar update with δ_y."""
+    return correct6(p, d, (p[1], p[6], p[7], p[8], p[9], p[10]), p[6] + r, y - d[1])
+
+
+@inline
+def correct_tilt(p: Any, d: Any, up: Any, r: float) -> Any:
+    """Two scalar updates with the measured up, (δ_y, −δ_x, ·) to first order; returns (P, correction)."""
+    p, d = correct_east(p, d, up[0], r)
+    return correct_north(p, d, -up[1], r)
+
+
+@inline
+def correct_north_down(p: Any, d: Any, a: float, b: float, y: float, r: float) -> Any:
+    """Scalar update with a δ_x + b δ_z."""
+    ph = (
+        a * p[0] + b * p[2],
+        a * p[1] + b * p[7],
+        a * p[2] + b * p[11],
+        a * p[3] + b * p[12],
+        a * p[4] + b * p[13],
+        a * p[5] + b * p[14],
+    )
+    return correct6(p, d, ph, a * ph[0] + b * ph[2] + r, y - (a * d[0] + b * d[2]))
 
 
 @inline

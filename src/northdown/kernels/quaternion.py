@@ -107,6 +107,24 @@ def rotate_inverse(q: Quaternion, v: Vector) -> Vector:
 
 
 @inline
+def scaled_axes(k: float, q: Quaternion) -> tuple[float, ...]:
+    """Nine entries, by rows, of k times the rotation matrix of q."""
+    w, x, y, z = q
+    k2 = 2.0 * k
+    return (
+        k - k2 * (y * y + z * z),
+        k2 * (x * y - w * z),
+        k2 * (x * z + w * y),
+        k2 * (x * y + w * z),
+        k - k2 * (x * x + z * z),
+        k2 * (y * z - w * x),
+        k2 * (x * z - w * y),
+        k2 * (y * z + w * x),
+        k - k2 * (x * x + y * y),
+    )
+
+
+@inline
 def whole_axes(q: Quaternion) -> tuple[Vector, Vector, Vector]:
     """Rows of the matrix of a rotation that maps axes on axes: entries of exactly 0, 1 and −1."""
     x, y, z = rotate(q, (1.0, 0.0, 0.0)), rotate(q, (0.0, 1.0, 0.0)), rotate(q, (0.0, 0.0, 1.0))

@@ -48,6 +48,13 @@ def has_heading(acc_or_down_b: Vector, mag_b: Vector) -> bool:
 
 
 @inline
+def has_horizontal(field_n: Vector) -> bool:
+    """`has_heading` for a field in navigation axes."""
+    square = field_n[0] * field_n[0] + field_n[1] * field_n[1]
+    return square > _PARALLEL * (square + field_n[2] * field_n[2])
+
+
+@inline
 def heading_error(q: Quaternion, mag_b: Vector) -> float:
     """Angle (rad) about down by which q must turn so that the horizontal field points to north."""
     h = rotate(q, mag_b)

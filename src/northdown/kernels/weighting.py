@@ -11,6 +11,9 @@ from northdown.kernels.quaternion import Vector
 LEARN = 1.0
 """Time (s) during which the field's reference is averaged without judging; judgement then comes in over as long."""
 
+ACCELERATING = 9.0
+"""Noise of linear acceleration, in units of the accelerometer's own variance, that leaves a tenth of its weight."""
+
 REJECTED = 4.6
 """Departure u from which a magnetometer sample keeps less than 1 % of its weight."""
 
