@@ -45,6 +45,7 @@ def test_runs_json_agrees_with_the_library(run):
     assert value["mean_nees"] == found.anees
     assert value["mean_nees_interval"] == list(found.interval)
     assert value["verdict"] == found.verdict
+    assert value["mean_nis"] == found.anis
     assert (value["runs"], value["seed"], value["estimator"]) == (4, 3, "mekf")
     assert len(value["bias_mean_square"]) == 3
 
@@ -56,6 +57,7 @@ def test_runs_table(run, tmp_path, name):
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith(f"{name}: ")
     assert "Runs       3 of 30 s, seed 0" in result.out
+    assert "Mean NIS   " in result.out
     assert ("Bias" in result.out) == (name == "mekf")
     assert max(map(len, result.out.split("Written")[0].splitlines())) <= 80
     assert b"<svg" in figure.read_bytes()

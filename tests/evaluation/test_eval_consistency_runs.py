@@ -33,6 +33,13 @@ def test_covariance_holds(name):
     low, high = chi2_bounds(1, RUNS, 0.998)
     assert (found.bias > low).all()
     assert (found.bias < high).all()
+    # innovations of a right filter are independent, so that their mean is known to 0.2 %; the linearisation of the
+    # start takes as much again
+    assert found.anis == pytest.approx(1.0, abs=0.01)
+    assert found.nis_bounds[0] < 1.0 < found.nis_bounds[1]
+    inside = (found.mean_nis > found.nis_time_bounds[0]) & (found.mean_nis < found.nis_time_bounds[1])
+    # 3000 independent times, so that 95 % is known to 0.4 %; the first has no measurement
+    assert np.mean(inside[1:]) == pytest.approx(0.95, abs=0.02)
 
 
 def test_a_single_time_of_many_runs_is_chi_square():
@@ -56,6 +63,8 @@ def test_others_are_measured(name, low, high):
     found = monte_carlo(get(name), 40, seed=0)
     assert low < found.anees < high
     assert (found.bias is None) == (name != "double-stage-ekf")
+    # 40 runs know it to 0.3 %
+    assert found.anis == pytest.approx(1.0, abs=0.012)
     assert name in repr(found)
 
 
@@ -84,6 +93,9 @@ def test_wrong_noise_is_found_out():
     assert 0.2 < shy.factor < 0.6
     assert shy.verdict.startswith("too cautious by a factor")
     assert shy.inside < 0.2
+    # the innovations show it without knowing the truth
+    assert shy.anis < 0.2
+    assert sure.anis > 2.0
 
 
 def test_half_the_noise_makes_half_the_errors():
@@ -122,10 +134,13 @@ def test_figures_agree_with_runs_made_by_hand():
     filter_ = SHORT.configured(get("quaternion-ekf"))
     assert filter_.dip == SHORT.dip
     seeds = np.random.SeedSequence(9).generate_state(4, np.uint64)
-    values = []
+    values, innovations = [], []
     for seed in seeds:
         recording, start = SHORT.draw(int(seed), bias=True)
-        values.append(nees(filter_.run(recording, initial=start), recording.reference).nees)
+        result = filter_.run(recording, initial=start)
+        values.append(nees(result, recording.reference).nees)
+        innovations.append(result.diagnostics["nis"].sum() / result.diagnostics["nis_dof"].sum())
+    assert found.anis == pytest.approx(np.mean(innovations), rel=1e-12)
     assert np.allclose(found.mean_nees, np.mean(values, axis=0), rtol=1e-12)
     means = np.mean(values, axis=1)
     # 97.5 % point of Student's t with three degrees of freedom, from its table

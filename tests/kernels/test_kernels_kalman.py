@@ -43,7 +43,7 @@ def case():
     return 0.7, A @ A.T, rng.normal(size=3), rng.normal(size=3)
 
 
-ZERO = (0.0,) * 6
+ZERO = (0.0,) * 7
 NORTH, DOWN = 0.6, 0.8
 TOLERANCE = {"rtol": 1e-9, "atol": 1e-11}  # rounding of an inverse of condition 1e3
 
@@ -52,7 +52,9 @@ def check(found, case, H, y, r):
     along, cov, scale, d = found
     P, correction = update(TO_E @ block_diag(case[0], case[1]) @ TO_E, H, y, r)
     np.testing.assert_allclose(matrix(along, cov), P, **TOLERANCE)
-    np.testing.assert_allclose(TO_E @ [scale, *d], correction, **TOLERANCE)
+    np.testing.assert_allclose(TO_E @ [scale, *d[:6]], correction, **TOLERANCE)
+    S = H @ TO_E @ block_diag(case[0], case[1]) @ TO_E @ H.T + np.diag(r)
+    np.testing.assert_allclose(d[6], y @ np.linalg.inv(S) @ y, **TOLERANCE)
 
 
 def test_up(case):

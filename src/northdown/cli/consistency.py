@@ -172,6 +172,11 @@ def _facts(found: ConsistencyResult) -> list[tuple[str, str]]:
             f"{percent} is right",
         ),
     ]
+    if found.anis is not None and found.nis_interval is not None:
+        low, high = found.nis_interval
+        rows.append(
+            ("Mean NIS", f"{found.anis:.4f} ({percent}: {low:.4f} to {high:.4f}); 1 per measurement is right")
+        )
     if found.bias is not None and found.bias_bounds is not None:
         axes = ", ".join(f"{v:.2f}" for v in found.bias)
         low, high = found.bias_bounds
@@ -216,6 +221,9 @@ def _simulation_as_dict(found: ConsistencyResult) -> dict[str, Any]:
         "consistent": found.consistent,
         "verdict": found.verdict,
         **_axes_as_dict("NED", found.share, found.rms_error, found.rms_sigma),
+        "mean_nis": found.anis,
+        "mean_nis_interval": None if found.nis_interval is None else list(found.nis_interval),
+        "nis_bounds": None if found.nis_bounds is None else list(found.nis_bounds),
         "bias_mean_square": None if found.bias is None else found.bias.tolist(),
         "bias_bounds": None if found.bias_bounds is None else list(found.bias_bounds),
     }

@@ -111,6 +111,9 @@ class KalmanFilter(Estimator):
       `Flag.ACC_REJECTED`.
     - ``field_departure``: u of the field's norm and dip, see `mekf`; 0 for a sample without field. Above 4.6 the
       magnetometer's sample has less than 1 % of its weight: `Flag.MAG_REJECTED`.
+    - ``nis``, ``nis_dof``: normalised innovation squared yᵀ S⁻¹ y of the sample, and how many scalar measurements it
+      is made of, 0 for none; a field made a unit vector counts two, as noise along it is gone, and one where only its
+      heading is compared. In a right filter it is χ² with so many degrees of freedom.
     """
 
     gyr_noise: float = parameter(0.01, unit="rad/s/√Hz", above=0.0)

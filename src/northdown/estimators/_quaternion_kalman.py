@@ -1,8 +1,8 @@
 r"""What the Kalman filters with seven states (attitude quaternion, gyroscope bias) share.
 
 State tuple: quaternion 4, bias 3, variance of e₀, P 21 of (δ, bias) (see `kernels.quaternion_kalman`), mean square
-of linear acceleration, ages of acc and mag, field's horizontal and down part and age, departure u of the last field
-sample.
+of linear acceleration, ages of acc and mag, field's horizontal and down part and age, departure u of this field
+sample, normalised innovation squared of this sample and its degrees of freedom.
 
 The step from q to q' = q ⊗ exp((ω − b) Δt) leaves e of δq = e ⊗ q as it is, but for the bias. Its derivative by b is
 taken as
@@ -29,8 +29,8 @@ from northdown.kernels.kalman import propagate_attitude_bias, symmetric3
 from northdown.kernels.quaternion import dot, multiply, normalize, scaled_axes
 from northdown.kernels.so3 import exp
 
-N_STATE = 36
-N_OUT = 21
+N_STATE = 38
+N_OUT = 23
 
 
 @inline
@@ -59,9 +59,11 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, rms linear acceleration, field's departure u."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, diagnostics."""
     sigma = (math.sqrt(s[23]), math.sqrt(s[26]), math.sqrt(s[28]))
-    return s[:7] + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + sigma + (math.sqrt(s[29]), s[35])
+    return (
+        s[:7] + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + sigma + (math.sqrt(s[29]), s[35], s[36], s[37])
+    )
 
 
 @inline
@@ -80,7 +82,9 @@ class QuaternionKalmanFilter(BiasKalmanFilter):
         "gyr_bias_sigma": slice(16, 19),
         "acceleration": slice(19, 20),
         "field_departure": slice(20, 21),
+        "nis": slice(21, 22),
+        "nis_dof": slice(22, 23),
     }
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
-        return (0.0, 0.0, 0.0, *start(self._bias_noise(), True), *(0.0,) * 7)
+        return (0.0, 0.0, 0.0, *start(self._bias_noise(), True), *(0.0,) * 9)

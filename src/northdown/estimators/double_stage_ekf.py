@@ -58,6 +58,7 @@ from northdown.estimators._quaternion_kalman import (
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
+from northdown.kernels.kalman import NO_CORRECTION
 from northdown.kernels.quaternion import conjugate, dot, multiply, normalize, rotate
 from northdown.kernels.quaternion_kalman import correct_field, correct_up
 from northdown.kernels.runner import Kernel
@@ -97,18 +98,19 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
     q, along, cov = predict(p, q, b, along, cov, gyr, dt)
 
-    nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nis, dof = 0.0, 0.0
     if is_sample(acc) and age_acc > 0.0:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
         k = 1.0 / g
         up = (k * force[0], k * force[1], k * force[2] + 1.0)
-        along, cov, scale, d = correct_up(along, cov, nothing, up, r)
+        along, cov, scale, d = correct_up(along, cov, NO_CORRECTION, up, r)
         turn = tilt_only(q, scale, d, additive)
         q = multiply(turn, q)
         b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_acc = 0.0
+        nis, dof = d[6], 3.0
     h = rotate(q, mag)
     if has_horizontal(h) and age_mag > 0.0:
         u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
@@ -116,12 +118,14 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         k = 1.0 / math.sqrt(dot(h, h))
         h, north = (k * h[0], k * h[1], k * h[2]), k * horizontal
         r = mag_var / (weight * age_mag)
-        along, cov, scale, d = correct_field(along, cov, nothing, (h[0] - north, h[1], 0.0), north, h[2], r)
+        along, cov, scale, d = correct_field(along, cov, NO_CORRECTION, (h[0] - north, h[1], 0.0), north, h[2], r)
         turn = heading_only(q, scale, d, additive)
         q = multiply(turn, q)
         b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_mag = 0.0
-    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u,)
+        nis += d[6]
+        dof += 1.0
+    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u, nis, dof)
 
 
 @dataclass(frozen=True, kw_only=True)

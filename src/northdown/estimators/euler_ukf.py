@@ -158,7 +158,8 @@ def correct(
 ) -> Any:
     """Measurement update (26)–(34) with the first m of the six measurements z of variances r (two numbers).
 
-    w0 is the extra weight of the centre in covariances, 1 − α² + β.
+    w0 is the extra weight of the centre in covariances, 1 − α² + β. Returns angles, P, and the normalised innovation
+    squared.
     """
     c0, c1, c2 = cholesky3(p, scale)
     h = np.empty((7, 6))
@@ -213,7 +214,9 @@ def correct(
             cross[row, j] = total / pivot
     x0, x1, x2 = x
     p00, p01, p02, p11, p12, p22 = p
+    nis = 0.0
     for j in range(m):
+        nis += y[j] * y[j]
         t0, t1, t2 = cross[0, j], cross[1, j], cross[2, j]
         x0 += t0 * y[j]
         x1 += t1 * y[j]
@@ -224,23 +227,24 @@ def correct(
         p11 -= t1 * t1
         p12 -= t1 * t2
         p22 -= t2 * t2
-    return (x0, x1, x2), (p00, p01, p02, p11, p12, p22)
+    return (x0, x1, x2), (p00, p01, p02, p11, p12, p22), nis
 
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (quaternion, angles, P, motion, ages of acc and mag, field's horizontal, down and age, u)."""
+    """One sample; s = (q, angles, P, motion, ages of acc and mag, field's horizontal, down and age, u, NIS, dof)."""
     gyr_var, scale_var, acc_var, motion_time, motion_window, mag_var, g = p[:7]
     alpha2, beta, kappa, rfu = p[12], p[13], p[14], p[15]
     x, cov = (s[4], s[5], s[6]), s[7:13]
     motion, age_acc, age_mag = s[13], s[14] + dt, s[15] + dt
     field = (s[16], s[17], s[18])
-    u = 0.0
+    u, nis = 0.0, 0.0
 
     rate, force, direction = remount(rfu, gyr), remount(rfu, acc), remount(rfu, mag)
     has_acc = is_sample(force) and age_acc > 0.0
     has_mag = dot(direction, direction) > 0.0 and age_mag > 0.0
     m = 6 if has_mag else 3
+    dof = (3.0 if has_acc else 0.0) + (2.0 if has_mag else 0.0)
     scale = alpha2 * (6 + m + kappa)
     w, w0 = 0.5 / scale, 1.0 - alpha2 + beta
     if dt > 0.0:
@@ -264,9 +268,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         north, down = p[16], p[17]
         if north != north and field[2] > 0.0:
             north, down = field_direction(field)
-        x, cov = correct(x, cov, z, m, (r_acc, r_mag), north, down, scale, w0, w)
+        x, cov, nis = correct(x, cov, z, m, (r_acc, r_mag), north, down, scale, w0, w)
     q = remount_quaternion(rfu, euler.from_zyx(x))
-    return q + x + cov + (motion, age_acc, age_mag) + field + (u,)
+    return q + x + cov + (motion, age_acc, age_mag) + field + (u, nis, dof)
 
 
 @inline
@@ -284,7 +288,7 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, covariance of its rotation vector in navigation axes, rms linear acceleration, field's departure u.
+    """Attitude, covariance of its rotation vector in navigation axes, diagnostics.
 
     δ = J (dφ, dθ, dψ) with the columns of J (cos ψ cos θ, sin ψ cos θ, −sin θ), (−sin ψ, cos ψ, 0), (0, 0, 1).
     """
@@ -298,7 +302,7 @@ def output(p: Any, s: Any) -> Any:
     z0 = p02 - sp * p00
     c00, c01, c11 = u0 * a0 + v0 * b0, u0 * a1 + v0 * b1, u1 * a1 + v1 * b1
     c02, c12 = w0 - sp * u0, w1 - sp * u1
-    return s[:4] + symmetric3(c00, c01, c02, c11, c12, w2 - sp * z0) + (math.sqrt(s[13]), s[19])
+    return s[:4] + symmetric3(c00, c01, c02, c11, c12, w2 - sp * z0) + (math.sqrt(s[13]), s[19], s[20], s[21])
 
 
 @inline
@@ -341,8 +345,8 @@ class EulerUKF(KalmanFilter):
         "euler-ukf",
         step,
         n_params=19,
-        n_state=20,
-        n_out=15,
+        n_state=22,
+        n_out=17,
         output=output,
         aligned=aligned,
         flagged=flagged,
@@ -352,6 +356,8 @@ class EulerUKF(KalmanFilter):
         "covariance": slice(4, 13),
         "acceleration": slice(13, 14),
         "field_departure": slice(14, 15),
+        "nis": slice(15, 16),
+        "nis_dof": slice(16, 17),
     }
     singular = "pitch ±90°"
 
@@ -388,4 +394,4 @@ class EulerUKF(KalmanFilter):
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         p = self._parameters(frame)
         angles = euler.to_zyx(remount_quaternion(p[15], tuple(quat)))
-        return (*angles, *start_covariance(p, True), *(0.0,) * 7)
+        return (*angles, *start_covariance(p, True), *(0.0,) * 9)

@@ -33,7 +33,7 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels import euler
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct6, symmetric3
+from northdown.kernels.kalman import NO_CORRECTION, correct6, symmetric3
 from northdown.kernels.quaternion import dot, down_b, multiply, normalize, rotate
 from northdown.kernels.runner import Kernel
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
@@ -51,8 +51,7 @@ def correct_angles(p: Any, angles: Any, residual: Any, r: Any) -> Any:
     """
     sp, cp = math.sin(angles[1]), math.cos(angles[1])
     sy, cy = math.sin(angles[2]), math.cos(angles[2])
-    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    p, d = correct_rotation(p, d, (cy / cp, sy / cp, 0.0), residual[0], r[0])
+    p, d = correct_rotation(p, NO_CORRECTION, (cy / cp, sy / cp, 0.0), residual[0], r[0])
     p, d = correct_rotation(p, d, (-sy, cy, 0.0), residual[1], r[1])
     return correct_rotation(p, d, (sp * cy / cp, sp * sy / cp, 1.0), residual[2], r[2])
 
@@ -79,7 +78,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     acc_var, motion_time, motion_window, mag_var, g = p[3:8]
     motion, age = s[29], s[30] + dt
     field = (s[32], s[33], s[34])
-    u = 0.0
+    u, nis, dof = 0.0, 0.0, 0.0
 
     q, along, cov = predict(p, (s[0], s[1], s[2], s[3]), (0.0, 0.0, 0.0), s[7], s[8:29], gyr, dt)
 
@@ -103,16 +102,17 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
                 euler.wrap(measured[2] - angles[2]),
             )
             cov, d = correct_angles(cov, angles, residual, r)
+            nis, dof = d[6], 3.0
             q = normalize(multiply((1.0, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q))
         age = 0.0
-    return q + (0.0, 0.0, 0.0) + (along,) + cov + (motion, age, 0.0) + field + (u,)
+    return q + (0.0, 0.0, 0.0) + (along,) + cov + (motion, age, 0.0) + field + (u, nis, dof)
 
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, its covariance, rms linear acceleration, field's departure u."""
+    """Attitude, its covariance, diagnostics."""
     q = (s[0], s[1], s[2], s[3])
-    return q + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + (math.sqrt(s[29]), s[35])
+    return q + symmetric3(s[8], s[9], s[10], s[14], s[15], s[19]) + (math.sqrt(s[29]), s[35], s[36], s[37])
 
 
 @inline
@@ -144,7 +144,7 @@ class GyroEulerEKF(KalmanFilter):
         step,
         n_params=15,
         n_state=N_STATE,
-        n_out=15,
+        n_out=17,
         output=output,
         aligned=aligned,
         flagged=flags,
@@ -154,6 +154,8 @@ class GyroEulerEKF(KalmanFilter):
         "covariance": slice(4, 13),
         "acceleration": slice(13, 14),
         "field_departure": slice(14, 15),
+        "nis": slice(15, 16),
+        "nis_dof": slice(16, 17),
     }
     singular = "pitch ±90°"
 
@@ -163,4 +165,4 @@ class GyroEulerEKF(KalmanFilter):
         return (*self._noise(), self.singular_pitch)
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
-        return (0.0, 0.0, 0.0, *start(self._noise(), True), *(0.0,) * 7)
+        return (0.0, 0.0, 0.0, *start(self._noise(), True), *(0.0,) * 9)

@@ -49,7 +49,13 @@ from northdown.estimators._kalman import BiasKalmanFilter, start_covariance, wei
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
-from northdown.kernels.kalman import correct_north_down, correct_tilt, propagate_attitude_bias, symmetric3
+from northdown.kernels.kalman import (
+    NO_CORRECTION,
+    correct_north_down,
+    correct_tilt,
+    propagate_attitude_bias,
+    symmetric3,
+)
 from northdown.kernels.quaternion import dot, multiply, normalize, rotate, scaled_axes
 from northdown.kernels.runner import Kernel
 from northdown.kernels.so3 import exp
@@ -59,7 +65,7 @@ from northdown.kernels.weighting import field_departure, linear_acceleration
 
 @inline
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
-    """One sample; s = (w, x, y, z, b, P, motion, age of acc, age of mag, field's horizontal, down and age, u)."""
+    """One sample; s = (q, b, P, motion, ages of acc and mag, field's horizontal, down and age, u, NIS, dof)."""
     gyr_var, scale_var, walk_var, acc_var, motion_time, motion_window, mag_var, g, norm_gate, dip_gate, window = p[
         :11
     ]
@@ -77,13 +83,14 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         )
         q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
 
-    d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    d, dof = NO_CORRECTION, 0.0
     if is_sample(acc) and age_acc > 0.0:
         f = rotate(q, acc)
         motion = linear_acceleration(motion, f, g, age_acc, motion_window)
         r = (acc_var + motion_time * motion) / (g * g * age_acc)
         cov, d = correct_tilt(cov, d, (f[0] / g, f[1] / g), r)
         age_acc = 0.0
+        dof = 2.0
     h = rotate(q, mag)
     if has_horizontal(h) and age_mag > 0.0:
         u, weight, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
@@ -91,8 +98,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r = mag_var * (1.0 + h[2] * h[2] / square) / (weight * age_mag)
         cov, d = correct_north_down(cov, d, h[2] / math.sqrt(square), -1.0, math.atan2(h[1], h[0]), r)
         age_mag = 0.0
+        dof += 1.0
     q = multiply(exp((d[0], d[1], d[2])), q)  # of unit norm, and normalised at the next step
-    return q + (bx + d[3], by + d[4], bz + d[5]) + cov + (motion, age_acc, age_mag) + field + (u,)
+    return q + (bx + d[3], by + d[4], bz + d[5]) + cov + (motion, age_acc, age_mag) + field + (u, d[6], dof)
 
 
 @inline
@@ -103,9 +111,9 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, rms linear acceleration, field's departure u."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, diagnostics."""
     sigma = (math.sqrt(s[22]), math.sqrt(s[25]), math.sqrt(s[27]))
-    return s[:7] + symmetric3(s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (math.sqrt(s[28]), s[34])
+    return s[:7] + symmetric3(s[7], s[8], s[9], s[13], s[14], s[18]) + sigma + (math.sqrt(s[28]), s[34], s[35], s[36])
 
 
 @inline
@@ -125,7 +133,7 @@ class MEKF(BiasKalmanFilter):
 
     name = "mekf"
     kernel = Kernel(
-        "mekf", step, n_params=14, n_state=35, n_out=21, output=output, aligned=aligned, flagged=flagged, covariance=7
+        "mekf", step, n_params=14, n_state=37, n_out=23, output=output, aligned=aligned, flagged=flagged, covariance=7
     )
     outputs = {  # noqa: RUF012  (a constant of the class)
         "gyr_bias": slice(4, 7),
@@ -133,6 +141,8 @@ class MEKF(BiasKalmanFilter):
         "gyr_bias_sigma": slice(16, 19),
         "acceleration": slice(19, 20),
         "field_departure": slice(20, 21),
+        "nis": slice(21, 22),
+        "nis_dof": slice(22, 23),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:
@@ -140,4 +150,4 @@ class MEKF(BiasKalmanFilter):
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         covariance = start_covariance(self._parameters(frame), True)
-        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 7)
+        return (0.0, 0.0, 0.0, *covariance, *(0.0,) * 9)

@@ -50,6 +50,7 @@ from northdown.estimators.base import parameter
 from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
+from northdown.kernels.kalman import NO_CORRECTION
 from northdown.kernels.quaternion import dot, multiply, normalize, rotate, unit
 from northdown.kernels.quaternion_kalman import correct_both, correct_field, correct_up
 from northdown.kernels.runner import Kernel
@@ -90,17 +91,20 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r_mag = mag_var / (weight * age_mag)
         age_mag = 0.0
 
-    scale, d = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    scale, d, dof = 0.0, NO_CORRECTION, 0.0
     if has_acc and has_mag:
         along, cov, scale, d = correct_both(along, cov, d, up, r_acc, h, north, down, r_mag)
+        dof = 5.0
     elif has_acc:
+        dof = 3.0
         along, cov, scale, d = correct_up(along, cov, d, up, r_acc)
     elif has_mag:
+        dof = 2.0
         along, cov, scale, d = correct_field(along, cov, d, h, north, down, r_mag)
     # P stays as it is while q moves: see the deviations above
     q = normalize(multiply((1.0 + scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q))
     b = (b[0] + d[3], b[1] + d[4], b[2] + d[5])
-    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u,)
+    return q + b + (along,) + cov + (motion, age_acc, age_mag) + field + (u, d[6], dof)
 
 
 @dataclass(frozen=True, kw_only=True)

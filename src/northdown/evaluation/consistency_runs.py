@@ -34,6 +34,7 @@ from northdown.evaluation.matching import find_reference
 
 if TYPE_CHECKING:
     from northdown.estimators import Estimator
+    from northdown.orientation import Orientation
 
 # Departure of sigma that nobody needs to care about, though many runs can prove it.
 _LITTLE: Final = 0.05
@@ -71,6 +72,19 @@ class ConsistencyResult:
         Mean square of the bias error over σ for each body axis, 1 is right; None where no bias is estimated.
     bias_bounds : (float, float), optional
         Interval of it for errors that stay the same throughout a run, so that it is rather too wide.
+    mean_nis : (N,) array, optional
+        Mean over the runs of the normalised innovation squared per degree of freedom at each time, NaN where nothing
+        was measured; 1 is right. None where the filter does not tell its innovations.
+    nis_interval : (float, float), optional
+        Interval of the true mean over all times, from the spread of the runs' means.
+    nis_bounds : (float, float), optional
+        Interval in which that mean lies with probability `confidence` if innovations are independent over time, as
+        those of a right filter are.
+    nis_time_bounds : (float, float), optional
+        Interval in which `mean_nis` lies with probability `confidence` at a time with the median number of
+        measurements.
+    anis : float, optional
+        Mean over all runs and times.
     example : NormalizedError
         The first run.
     """
@@ -90,6 +104,11 @@ class ConsistencyResult:
     rms_sigma: FloatArray
     bias: FloatArray | None
     bias_bounds: tuple[float, float] | None
+    mean_nis: FloatArray | None
+    nis_interval: tuple[float, float] | None
+    nis_bounds: tuple[float, float] | None
+    nis_time_bounds: tuple[float, float] | None
+    anis: float | None
     example: NormalizedError
 
     @property
@@ -177,7 +196,8 @@ def monte_carlo(
             progress(k)
         recording, start = world.draw(int(number), bias="gyr_bias" in filter_.outputs)
         # the truth itself, as the mask of the recording would leave out its rests
-        tally.add(nees(filter_.run(recording, initial=start), find_reference(recording)))
+        result = filter_.run(recording, initial=start)
+        tally.add(nees(result, find_reference(recording)), result)
     return tally.result(estimator.name, check_seed(seed), confidence)
 
 
@@ -207,8 +227,11 @@ class _Tally:
         self._means: list[float] = []
         self._nees: FloatArray = np.zeros(1)
         self._share, self._error, self._sigma, self._bias = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3)
+        self._nis_means: list[float] = []
+        self._nis: FloatArray = np.zeros(1)
+        self._dof: FloatArray = np.zeros(1)
 
-    def add(self, run: NormalizedError) -> None:
+    def add(self, run: NormalizedError, result: Orientation) -> None:
         if self._first is None:
             self._first = run
         self._means.append(float(run.nees.mean()))
@@ -218,6 +241,10 @@ class _Tally:
         self._sigma += np.mean(run.sigma**2, axis=0)
         if run.bias is not None:
             self._bias += np.mean(run.bias**2, axis=0)
+        if "nis" in result.diagnostics:
+            nis, dof = result.diagnostics["nis"], result.diagnostics["nis_dof"]
+            self._nis, self._dof = self._nis + nis, self._dof + dof
+            self._nis_means.append(float(nis.sum() / dof.sum()))
 
     def result(self, name: str, seed: int, confidence: float) -> ConsistencyResult:
         from scipy.stats import t
@@ -228,7 +255,8 @@ class _Tally:
         mean_nees: FloatArray = self._nees / runs
         low, high = chi2_bounds(DEGREES_OF_FREEDOM, runs, confidence)
         anees = float(means.mean())
-        half = float(t.ppf(0.5 + 0.5 * confidence, runs - 1) * means.std(ddof=1) / math.sqrt(runs))
+        spread = float(t.ppf(0.5 + 0.5 * confidence, runs - 1)) / math.sqrt(runs)
+        half = spread * float(means.std(ddof=1))
         has_bias = self._first.bias is not None
         return ConsistencyResult(
             name=name,
@@ -247,4 +275,27 @@ class _Tally:
             bias=self._bias / runs if has_bias else None,
             bias_bounds=chi2_bounds(1, runs, confidence) if has_bias else None,
             example=self._first,
+            **self._innovations(spread, confidence),
         )
+
+    def _innovations(self, spread: float, confidence: float) -> dict[str, Any]:
+        if not self._nis_means:
+            return dict.fromkeys(("mean_nis", "nis_interval", "nis_bounds", "nis_time_bounds", "anis"))
+        means = np.array(self._nis_means)
+        anis, half = float(means.mean()), spread * float(means.std(ddof=1))
+        mean_nis = np.full(len(self._nis), np.nan)
+        np.divide(self._nis, self._dof, out=mean_nis, where=self._dof > 0.0)
+        at_a_time = float(np.median(self._dof[self._dof > 0.0]))
+        return {
+            "mean_nis": mean_nis,
+            "nis_interval": (anis - half, anis + half),
+            "nis_bounds": _bounds_per_degree(float(self._dof.sum()), confidence),
+            "nis_time_bounds": _bounds_per_degree(at_a_time, confidence),
+            "anis": anis,
+        }
+
+
+def _bounds_per_degree(dof: float, confidence: float) -> tuple[float, float]:
+    """Interval of χ² with `dof` degrees of freedom, over their number."""
+    low, high = chi2_bounds(dof, 1, confidence)
+    return low / dof, high / dof

@@ -9,7 +9,7 @@ Covariances of size six are those of the attitude error δ in navigation axes an
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from northdown.kernels.jit import inline
 
@@ -46,11 +46,16 @@ def reduce6(p: Any, h: Any, inverse_s: float) -> Any:
     )
 
 
+NO_CORRECTION: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Where the corrections of `correct6` start from."""
+
+
 @inline
 def correct6(p: Any, d: Any, ph: Any, s: float, y: float) -> Any:
     """One scalar update from ph = P Hᵀ, s = H P Hᵀ + r and the residual y at the point reached.
 
-    d is the correction gathered so far. Returns (P, d).
+    d is the correction gathered so far, and as its last entry the normalised innovation squared Σ y²/s of the updates
+    that it came from. Returns (P, d).
     """
     k = 1.0 / s
     g = y * k
@@ -61,6 +66,7 @@ def correct6(p: Any, d: Any, ph: Any, s: float, y: float) -> Any:
         d[3] + g * ph[3],
         d[4] + g * ph[4],
         d[5] + g * ph[5],
+        d[6] + g * y,
     )
     return reduce6(p, ph, k), d
 

@@ -17,9 +17,15 @@ from northdown.kernels.kalman import correct_east, correct_north, correct_north_
 
 @inline
 def correct_scale(p: float, y: float, r: float) -> Any:
-    """Scalar update with e₀, of variance p; returns (p, correction)."""
-    k = p / (p + r)
-    return p - k * p, k * y
+    """Scalar update with e₀, of variance p; returns (p, correction, normalised innovation squared)."""
+    g = y / (p + r)
+    return p - p * p / (p + r), p * g, y * g
+
+
+@inline
+def with_nis(d: Any, nis: float) -> Any:
+    """Corrections with what another scalar update adds to the normalised innovation squared."""
+    return d[:6] + (d[6] + nis,)
 
 
 @inline
@@ -43,19 +49,19 @@ def correct_up(p: float, cov: Any, d: Any, y: Any, r: float) -> Any:
 
     Returns the variance of e₀, P of (δ, bias), and the corrections of e₀ and of (δ, bias).
     """
-    p, scale = correct_scale(p, seen_up(y)[0], 0.25 * r)
+    p, scale, nis = correct_scale(p, seen_up(y)[0], 0.25 * r)
     cov, d = correct_tilt(cov, d, y, r)
-    return p, cov, scale, d
+    return p, cov, scale, with_nis(d, nis)
 
 
 @inline
 def correct_field(p: float, cov: Any, d: Any, y: Any, north: float, down: float, r: float) -> Any:
     """Update with the unit vector (north, 0, down), likewise."""
     e = seen_field(y, north, down)
-    p, scale = correct_scale(p, e[0], 0.25 * r)
+    p, scale, nis = correct_scale(p, e[0], 0.25 * r)
     cov, d = correct_east(cov, d, e[2], r)
     cov, d = correct_north_down(cov, d, down, -north, e[1], r)
-    return p, cov, scale, d
+    return p, cov, scale, with_nis(d, nis)
 
 
 @inline
@@ -65,14 +71,16 @@ def correct_both(
     """Update with up and the field at once.
 
     Both see e₀ and δ_y by themselves: two measurements of one quantity are one, their mean weighted by 1/r. So six
-    scalar updates become four without any approximation.
+    scalar updates become four without any approximation. Only the normalised innovation squared also has their
+    difference in it.
     """
     a, b = seen_up(up), seen_field(field, north, down)
     k = 1.0 / (r_up + r)
     v, w = k * r, k * r_up
     mean = v * r_up
-    p, scale = correct_scale(p, v * a[0] + w * b[0], 0.25 * mean)
+    p, scale, nis = correct_scale(p, v * a[0] + w * b[0], 0.25 * mean)
     cov, d = correct_north(cov, d, a[1], r_up)
     cov, d = correct_east(cov, d, v * a[2] + w * b[2], mean)
     cov, d = correct_north_down(cov, d, down, -north, b[1], r)
-    return p, cov, scale, d
+    y0, y2 = a[0] - b[0], a[2] - b[2]
+    return p, cov, scale, with_nis(d, nis + k * (4.0 * y0 * y0 + y2 * y2))

@@ -47,7 +47,9 @@ def consistency(result: NormalizedError | ConsistencyResult) -> Figure:
     -------
     matplotlib.figure.Figure
         Three panels in degrees, about the axes of the frame, and one of the NEES with the interval of χ², in which
-        it lies in 95 % of all cases (or the result's own confidence) when the covariance is right.
+        it lies in 95 % of all cases (or the result's own confidence) when the covariance is right. Of a
+        `monte_carlo` also one of the normalised innovation squared (NIS) per degree of freedom, where the filter
+        tells it.
 
     Raises
     ------
@@ -67,12 +69,16 @@ def consistency(result: NormalizedError | ConsistencyResult) -> Figure:
         raise InputError(expected("the result of nees() or monte_carlo()", type(result).__name__))
     if not len(run):
         raise InputError(expected("errors to draw", "none"))
-    figure, axes = new_figure([1.0, 1.0, 1.0, 1.2])
+    innovations = isinstance(result, ConsistencyResult) and result.mean_nis is not None
+    figure, axes = new_figure([1.0, 1.0, 1.0, 1.2] + [1.0] * innovations)
     clock = Clock(run.time[0], run.time[-1])
     for k, ax in enumerate(axes[:3]):
         _draw_component(ax, clock, run, k)
-    _draw_nees(axes[3], clock, run.time, value, bounds)
+    _draw_square(axes[3], clock, run.time, value, DEGREES_OF_FREEDOM, bounds)
     label(axes[3], what)
+    if isinstance(result, ConsistencyResult) and result.mean_nis is not None and result.nis_time_bounds is not None:
+        _draw_square(axes[4], clock, run.time, result.mean_nis, 1.0, result.nis_time_bounds)
+        label(axes[4], "mean NIS per\nmeasurement")
     handles = [
         line_handle("error", color=_COLOR),
         patch_handle("±3σ", facecolor=_COLOR, alpha=0.22),
@@ -94,9 +100,13 @@ def _draw_component(ax: Axes, clock: Clock, run: NormalizedError, k: int) -> Non
     label(ax, f"error about\n{AXIS_NAMES[run.frame][k]} (°)")
 
 
-def _draw_nees(ax: Axes, clock: Clock, time: FloatArray, value: FloatArray, bounds: tuple[float, float]) -> None:
+def _draw_square(
+    ax: Axes, clock: Clock, time: FloatArray, value: FloatArray, right: float, bounds: tuple[float, float]
+) -> None:
+    there = ~np.isnan(value)
+    time, value = time[there], value[there]
     ax.axhspan(*bounds, facecolor="0.85", edgecolor="none", zorder=0)
-    ax.axhline(DEGREES_OF_FREEDOM, zorder=3, **_MEAN)
+    ax.axhline(right, zorder=3, **_MEAN)
     draw(ax, clock, time, value, gap=longest_gap(time), color=_COLOR, linewidth=0.8)
     top = float(np.percentile(value, 99.5))
     if top > 20.0 * bounds[1]:
