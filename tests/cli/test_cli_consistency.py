@@ -15,7 +15,10 @@ def test_recording_json_agrees_with_the_library(run, recording, csv):
     result = run("consistency", csv, "-e", "quaternion-ekf", "-p", "acc_noise=0.3", "--json")
     assert (result.code, result.err) == (0, "")
     value = json.loads(result.out)
-    found = coverage(get("quaternion-ekf")(acc_noise=0.3).run(recording), recording)
+    estimate = get("quaternion-ekf")(acc_noise=0.3).run(recording)
+    found = coverage(estimate, recording)
+    nis = estimate.diagnostics["nis"].sum() / estimate.diagnostics["nis_dof"].sum()
+    assert value["mean_nis"] == pytest.approx(nis, rel=1e-6)
     # the file holds text of so many digits
     assert value["mean_nees"] == pytest.approx(found.mean_nees, rel=1e-6)
     assert value["samples"] == found.count == recording.movement.sum()
@@ -31,7 +34,7 @@ def test_recording_table(run, csv, tmp_path):
     result = run("consistency", csv, "--frame", "ENU", "--plot", figure)
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith("mekf: ")
-    for text in ("about east", "about north", "about up", "when right", "68.3", "Mean NEES", "Written: "):
+    for text in ("about east", "about north", "about up", "when right", "68.3", "Mean NEES", "Mean NIS", "Written: "):
         assert text in result.out
     assert max(map(len, result.out.split("Written")[0].splitlines())) <= 80
     assert figure.read_bytes().startswith(b"\x89PNG")

@@ -78,6 +78,7 @@ def consistency(
     if plot is not None:
         check_target("--plot", plot, source=reading.source or "-", suffixes=FIGURE_SUFFIXES)
     found: ConsistencyResult | NormalizedError
+    mean_nis = None
     if reading.source == _NO_RECORDING:
         if reading != Reading(source=_NO_RECORDING) or force or max_gap != gate.MAX_GAP_TEXT:
             raise InputError(expected("a recording with the options for reading one", "none", do="name a file first"))
@@ -85,15 +86,15 @@ def consistency(
     else:
         if runs is not None or seed is not None:
             raise InputError(expected("either a recording, or --runs and --seed", "both"))
-        found = _recorded(reading, chosen(**values), gate.read_max_gap(max_gap), force)
+        found, mean_nis = _recorded(reading, chosen(**values), gate.read_max_gap(max_gap), force)
     if plot is not None:
         from northdown import plots
 
         plots.save(plots.consistency(found), plot)
     if json:
-        console.write_json(as_dict(found))
+        console.write_json(as_dict(found, mean_nis))
         return
-    _show(found)
+    _show(found, mean_nis)
     if plot is not None:
         print(console.one_line(f"Written: {plot}"))
 
@@ -118,21 +119,26 @@ def _simulated(
         return monte_carlo(chosen, count, number, parameters=values, progress=lambda _: next(names, None))
 
 
-def _recorded(reading: Reading, configured: Estimator, longest: float, force: bool) -> NormalizedError:
+def _recorded(
+    reading: Reading, configured: Estimator, longest: float, force: bool
+) -> tuple[NormalizedError, float | None]:
+    """Errors over what the covariance says, and the mean NIS per measurement where the filter tells it."""
     from northdown.evaluation import nees
 
     recording = reading.load()
     check_sensors(type(configured), recording)
     gate.admit(recording, [type(configured)], max_gap=longest, force=force)
-    found = nees(configured.run(recording, max_gap=longest), recording)
+    result = configured.run(recording, max_gap=longest)
+    found = nees(result, recording)
     if found.alignment is not None:
         for finding in found.alignment.findings:
             if finding.severity != "note":
                 console.warn(f"warning: {finding.message}")
-    return found
+    dof = float(result.diagnostics["nis_dof"].sum()) if "nis_dof" in result.diagnostics else 0.0
+    return found, float(result.diagnostics["nis"].sum()) / dof if dof > 0.0 else None
 
 
-def _show(found: ConsistencyResult | NormalizedError) -> None:
+def _show(found: ConsistencyResult | NormalizedError, mean_nis: float | None) -> None:
     from northdown.evaluation import ConsistencyResult, coverage
 
     if isinstance(found, ConsistencyResult):
@@ -148,7 +154,10 @@ def _show(found: ConsistencyResult | NormalizedError) -> None:
     print()
     _axis_table(what.frame, what.share, what.rms_error, what.rms_sigma)
     print()
-    console.facts([("Mean NEES", f"{what.mean_nees:.3g}; 3 is right")])
+    rows = [("Mean NEES", f"{what.mean_nees:.3g}; 3 is right")]
+    if mean_nis is not None:
+        rows.append(("Mean NIS", f"{mean_nis:.3g}; 1 per measurement is right"))
+    console.facts(rows)
 
 
 def _judgement(factor: float) -> str:
@@ -200,11 +209,13 @@ def _axis_table(frame: Any, share: FloatArray, rms_error: FloatArray, rms_sigma:
     console.table(("", "RMS error °", "RMS sigma °", "% in 1σ", "% in 2σ", "% in 3σ"), rows)
 
 
-def as_dict(found: ConsistencyResult | NormalizedError) -> dict[str, Any]:
-    """The figures for programs; angles in degrees."""
+def as_dict(found: ConsistencyResult | NormalizedError, mean_nis: float | None = None) -> dict[str, Any]:
+    """The figures for programs; angles in degrees. `mean_nis` is that of a recording."""
     from northdown.evaluation import ConsistencyResult
 
-    return _simulation_as_dict(found) if isinstance(found, ConsistencyResult) else _recording_as_dict(found)
+    if isinstance(found, ConsistencyResult):
+        return _simulation_as_dict(found)
+    return {**_recording_as_dict(found), "mean_nis": mean_nis}
 
 
 def _simulation_as_dict(found: ConsistencyResult) -> dict[str, Any]:
