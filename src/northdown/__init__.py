@@ -36,7 +36,18 @@ from northdown.recording import Recording
 
 if TYPE_CHECKING:
     # For editors and type checkers only. At run time estimators are found by their files, see `__getattr__`.
-    from northdown import calibration, datasets, estimators, evaluation, fields, frames, io, plots, simulation
+    from northdown import (
+        calibration,
+        datasets,
+        estimators,
+        evaluation,
+        fields,
+        frames,
+        io,
+        navigation,
+        plots,
+        simulation,
+    )
     from northdown.estimators.complementary import Complementary
     from northdown.estimators.cross_product import CrossProduct
     from northdown.estimators.double_stage_ekf import DoubleStageEKF
@@ -51,6 +62,7 @@ if TYPE_CHECKING:
     from northdown.estimators.triad import Triad
     from northdown.evaluation import align, attitude_error
     from northdown.io import read, read_orientation, write_orientation, write_recording
+    from northdown.navigation import Trajectory, navigate
     from northdown.simulation import simulate
 
 __version__ = "0.1.0"
@@ -74,6 +86,7 @@ __all__ = [
     "QuaternionEKF",
     "Recording",
     "TiltCompass",
+    "Trajectory",
     "Triad",
     "align",
     "attitude_error",
@@ -84,6 +97,8 @@ __all__ = [
     "fields",
     "frames",
     "io",
+    "navigate",
+    "navigation",
     "plots",
     "read",
     "read_orientation",
@@ -101,12 +116,15 @@ _MODULES = (
     "fields",
     "frames",
     "io",
+    "navigation",
     "plots",
     "simulation",
 )
-_FUNCTIONS = {
+_HOMES = {
+    "Trajectory": "navigation",
     "align": "evaluation",
     "attitude_error": "evaluation",
+    "navigate": "navigation",
     "read": "io",
     "read_orientation": "io",
     "simulate": "simulation",
@@ -119,8 +137,8 @@ def __getattr__(name: str) -> Any:
     """Load submodules, functions and estimators on first use, so that the import itself is cheap."""
     if name in _MODULES:
         return importlib.import_module(f"northdown.{name}")
-    if name in _FUNCTIONS:
-        value = getattr(importlib.import_module(f"northdown.{_FUNCTIONS[name]}"), name)
+    if name in _HOMES:
+        value = getattr(importlib.import_module(f"northdown.{_HOMES[name]}"), name)
         globals()[name] = value
         return value
     if name[:1].isupper():

@@ -56,7 +56,7 @@ def test_help_lists_motions_and_presets(run):
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        (("--motion", "walk", "-o", "a.csv"), "--motion to be one of random"),
+        (("--motion", "fly", "-o", "a.csv"), "--motion to be one of random"),
         (("--preset", "mpu", "-o", "a.csv"), "--preset to be one of perfect"),
         (("--duration", "0.5", "-o", "a.csv"), "--duration between 1 and"),
         (("--duration", "long", "-o", "a.csv"), "a number of s for --duration, got 'long'"),

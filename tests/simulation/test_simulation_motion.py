@@ -27,6 +27,7 @@ from northdown.simulation import (
     sines,
     steady,
     tumbling,
+    walk,
     waypoints,
 )
 from northdown.simulation.motion_library import MOTIONS
@@ -234,3 +235,17 @@ def test_free_body_obeys_euler(fast, slow, inertia):
 def test_mistakes_are_told(make, match):
     with pytest.raises(InputError, match=match):
         make()
+
+
+def test_walk_comes_back_and_stands_between_its_steps():
+    motion = walk(30.0, stride=1.2, period=1.1)
+    state = motion.at(motion.times(500.0))
+    still = (np.linalg.norm(state.velocity, axis=1) < 1e-12) & (np.linalg.norm(state.rate, axis=1) < 1e-12)
+    stances = np.flatnonzero(np.diff(still.astype(int)) == 1)
+    assert len(stances) == 21  # strides of 1.1 s in 24 s
+    assert np.allclose(state.position[-1], state.position[0], atol=1e-12)
+    steps = np.linalg.norm(np.diff(state.position[stances + 1], axis=0), axis=1)
+    assert np.allclose(steps, 2.0 * 1.2 * 21 / (2.0 * np.pi) * np.sin(np.pi / 21))  # chords of the circle
+    assert np.abs(state.position[still, 2]).max() < 1e-12
+    down = state.rotation[still].apply([0.0, 0.0, 1.0])
+    assert np.allclose(down, [0.0, 0.0, 1.0], atol=1e-12)

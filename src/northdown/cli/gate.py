@@ -31,16 +31,21 @@ def read_max_gap(text: str) -> float:
 
 
 def admit(recording: Recording, estimators: Sequence[type[Estimator]], *, max_gap: float, force: bool) -> None:
+    """Check a recording for estimators; see `admit_sensors`."""
+    used = {sensor for estimator in estimators for sensor in estimator.uses}
+    admit_sensors(recording, used, max_gap=max_gap, force=force)
+
+
+def admit_sensors(recording: Recording, used: set[str], *, max_gap: float, force: bool) -> None:
     """Check a recording: warnings go to standard error, an error stops unless `force`.
 
-    What concerns only a sensor that none of the estimators uses is left out.
+    What concerns only a sensor that is not used is left out.
 
     Raises
     ------
     InputError
         With the first error found, without `force`.
     """
-    used = {sensor for estimator in estimators for sensor in estimator.uses}
     unused = {"gyr", "acc", "mag"} - used
     findings = [f for f in recording.check() if f.kind.partition("-")[0] not in unused]
     errors = [f for f in findings if f.severity == "error" and not _may_be_bridged(f, recording, max_gap)]

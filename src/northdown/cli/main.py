@@ -22,6 +22,7 @@ from northdown.cli.demo import demo
 from northdown.cli.estimate import estimate
 from northdown.cli.estimators import estimators
 from northdown.cli.info import info
+from northdown.cli.navigate import navigate
 from northdown.cli.simulate import simulate
 from northdown.errors import NorthdownError
 
@@ -80,7 +81,7 @@ def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _command in (info, estimate, compare, consistency, estimators, calibrate, allan, simulate, demo):
+for _command in (info, estimate, navigate, compare, consistency, estimators, calibrate, allan, simulate, demo):
     app.command(_command.__name__)(_stoppable(_command))
 
 

@@ -37,23 +37,33 @@ REFERENCE: Final[dict[str, Any]] = {"color": "black", "linestyle": (0, (4, 2)), 
 
 def new_figure(heights: Sequence[float], height_cm: float | None = None) -> tuple[Figure, list[Axes]]:
     """Figure with panels one below the other, of these relative heights, sharing the time axis."""
+    figure = empty_figure(height_cm if height_cm is not None else 2.5 + 3.6 * float(sum(heights)))
+    axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))[:, 0]
+    for ax in axes:
+        prepare(ax)
+    return figure, list(axes)
+
+
+def empty_figure(height_cm: float) -> Figure:
+    """Figure without panels, as wide as the text on a page of A4."""
     import_optional("matplotlib", "plots")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    tall = height_cm if height_cm is not None else 2.5 + 3.6 * float(sum(heights))
-    figure = Figure(figsize=(_WIDTH, tall * _CM), layout="constrained")
+    figure = Figure(figsize=(_WIDTH, height_cm * _CM), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))[:, 0]
-    for ax in axes:
-        ax.grid(True, color="0.88", linewidth=0.5)
-        ax.set_axisbelow(True)
-        ax.tick_params(labelsize=_SMALL, length=3)
-        ax.xaxis.get_offset_text().set_fontsize(_SMALL)
-        ax.yaxis.get_offset_text().set_fontsize(_SMALL)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
-    return figure, list(axes)
+    return figure
+
+
+def prepare(ax: Axes) -> None:
+    """Grid, small tick labels, and no frame at the top and the right."""
+    ax.grid(True, color="0.88", linewidth=0.5)
+    ax.set_axisbelow(True)
+    ax.tick_params(labelsize=_SMALL, length=3)
+    ax.xaxis.get_offset_text().set_fontsize(_SMALL)
+    ax.yaxis.get_offset_text().set_fontsize(_SMALL)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
 
 
 class Clock:

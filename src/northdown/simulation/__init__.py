@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from northdown.simulation.motion_paths import Shaking, SplinePath, Still
     from northdown.simulation.motion_random import random_motion
     from northdown.simulation.motion_through import replay, waypoints
+    from northdown.simulation.motion_walk import walk
     from northdown.simulation.presets import (
         ADIS16470,
         ADXL345,
@@ -94,6 +95,7 @@ __all__ = [
     "steady",
     "swing",
     "tumbling",
+    "walk",
     "waypoints",
     "write_chunks",
 ]
@@ -110,6 +112,7 @@ _HOMES = {
     "motion_paths": ("Shaking", "SplinePath", "Still"),
     "motion_random": ("random_motion",),
     "motion_through": ("replay", "waypoints"),
+    "motion_walk": ("walk",),
     "presets": (
         "ADIS16470",
         "ADXL345",

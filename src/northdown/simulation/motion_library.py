@@ -16,6 +16,7 @@ from northdown.simulation.motion_closed import AboutAxis, Coning, Fixed, swing
 from northdown.simulation.motion_from_rate import FromRate, free_body
 from northdown.simulation.motion_paths import Still
 from northdown.simulation.motion_random import random_motion
+from northdown.simulation.motion_walk import walk
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -144,5 +145,6 @@ MOTIONS: Final[dict[str, Callable[[float, int], Motion]]] = {
     "pitch-sweep": _of_duration(pitch_sweep),
     "coning": _of_duration(coning),
     "tumbling": _of_duration(tumbling),
+    "walk": _of_duration(walk),
 }
 """Motions by name: from duration (s) and seed. Only ``"random"`` depends on the seed."""
