@@ -19,7 +19,8 @@ FILES = sorted(ROOT.rglob("*.py"))
 # fmt: off
 LAYERS = [
     "errors", "_validation", "kernels", "frames", "orientation", "fields", "arrays", "checks", "recording", "io",
-    "datasets", "estimators", "navigation", "calibration", "simulation", "evaluation", "plots", "report", "live", "cli",
+    "datasets", "estimators", "navigation", "calibration", "simulation", "evaluation", "plots", "report", "live",
+    "cli",
 ]
 # fmt: on
 

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from northdown.estimators.quaternion_ekf import QuaternionEKF
     from northdown.estimators.tilt_compass import TiltCompass
     from northdown.estimators.triad import Triad
-    from northdown.evaluation import align, attitude_error
+    from northdown.evaluation import align, attitude_error, observability
     from northdown.io import read, read_orientation, write_orientation, write_recording
     from northdown.navigation import Trajectory, navigate
     from northdown.simulation import simulate
@@ -99,6 +99,7 @@ __all__ = [
     "io",
     "navigate",
     "navigation",
+    "observability",
     "plots",
     "read",
     "read_orientation",
@@ -125,6 +126,7 @@ _HOMES = {
     "align": "evaluation",
     "attitude_error": "evaluation",
     "navigate": "navigation",
+    "observability": "evaluation",
     "read": "io",
     "read_orientation": "io",
     "simulate": "simulation",

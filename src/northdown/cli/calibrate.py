@@ -63,7 +63,7 @@ def calibrate(
     json: Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")] = False,
     force: Force = False,
 ) -> None:
-    """Find a sensor's offset, scale and alignment from recordings.
+    """Find a sensor's offset, scale and axes from recordings.
 
     mag: turned slowly about all axes. acc: at rest in nine positions or more. gyr: at rest; with turns between rests
     also scale and alignment. What --calibration names is applied first, and written together with what is found.

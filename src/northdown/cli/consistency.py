@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
@@ -14,7 +11,7 @@ from northdown.cli import console, gate
 from northdown.cli.numbers import read_count, read_number
 from northdown.cli.output import FIGURE_SUFFIXES, check_target
 from northdown.cli.parameters import read_assignments
-from northdown.cli.reading import Reading, reads_recording
+from northdown.cli.reading import NO_RECORDING, Reading, reads_recording, recording_optional
 from northdown.cli.selection import check_sensors
 from northdown.errors import InputError, expected
 
@@ -23,28 +20,11 @@ if TYPE_CHECKING:
     from northdown.estimators import Estimator
     from northdown.evaluation import ConsistencyResult, NormalizedError
 
-_NO_RECORDING: Final = ""
 _RUNS, _SEED = 50, 0
 _MOST_RUNS: Final = 100_000
 
 
-def _recording_optional(command: Callable[..., None]) -> Callable[..., None]:
-    """Let the recording be left out."""
-
-    @functools.wraps(command)
-    def run(**values: Any) -> None:
-        command(**values)
-
-    signature = inspect.signature(command)
-    run.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[
-            p.replace(default=_NO_RECORDING) if p.name == "source" else p for p in signature.parameters.values()
-        ]
-    )
-    return run
-
-
-@_recording_optional
+@recording_optional
 @reads_recording
 def consistency(
     reading: Reading,
@@ -79,8 +59,8 @@ def consistency(
         check_target("--plot", plot, source=reading.source or "-", suffixes=FIGURE_SUFFIXES)
     found: ConsistencyResult | NormalizedError
     mean_nis = None
-    if reading.source == _NO_RECORDING:
-        if reading != Reading(source=_NO_RECORDING) or force or max_gap != gate.MAX_GAP_TEXT:
+    if reading.source == NO_RECORDING:
+        if reading != Reading(source=NO_RECORDING) or force or max_gap != gate.MAX_GAP_TEXT:
             raise InputError(expected("a recording with the options for reading one", "none", do="name a file first"))
         found = _simulated(chosen, values, runs, seed)
     else:

@@ -23,6 +23,7 @@ from northdown.cli.estimate import estimate
 from northdown.cli.estimators import estimators
 from northdown.cli.info import info
 from northdown.cli.navigate import navigate
+from northdown.cli.observability import observability
 from northdown.cli.simulate import simulate
 from northdown.errors import NorthdownError
 
@@ -81,7 +82,20 @@ def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _command in (info, estimate, navigate, compare, consistency, estimators, calibrate, allan, simulate, demo):
+_COMMANDS = (
+    info,
+    estimate,
+    navigate,
+    compare,
+    consistency,
+    observability,
+    estimators,
+    calibrate,
+    allan,
+    simulate,
+    demo,
+)
+for _command in _COMMANDS:
     app.command(_command.__name__)(_stoppable(_command))
 
 

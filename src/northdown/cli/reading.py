@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Concatenate, ParamSpec, cast, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Concatenate, Final, ParamSpec, cast, get_type_hints
 
 import typer
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from northdown.recording import Recording, ReferenceOffset
 
 P = ParamSpec("P")
+
+NO_RECORDING: Final = ""
+"""Source of a `Reading` when none was named; see `recording_optional`."""
 
 _ALIGNMENTS = ("none", "heading", "rotations")
 # A file of this size (bytes) takes long enough to read that one wonders.
@@ -143,6 +146,22 @@ def reads_recording(command: Callable[Concatenate[Reading, P], None]) -> Callabl
     with_reading.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
     with_reading.__annotations__ = {p.name: p.annotation for p in (*own, *shared)}
     return with_reading
+
+
+def recording_optional(command: Callable[..., None]) -> Callable[..., None]:
+    """Let the recording of a command be left out; its source is then `NO_RECORDING`."""
+
+    @functools.wraps(command)
+    def run(**values: Any) -> None:
+        command(**values)
+
+    signature = inspect.signature(command)
+    run.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[
+            p.replace(default=NO_RECORDING) if p.name == "source" else p for p in signature.parameters.values()
+        ]
+    )
+    return run
 
 
 def _default(f: Any) -> Any:

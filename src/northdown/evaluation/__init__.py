@@ -1,4 +1,7 @@
-"""Compare an estimated orientation with the true one: matching in time, alignment, error metrics, covariances."""
+"""Compare an estimated orientation with the true one: matching in time, alignment, error metrics, covariances.
+
+And find out what an estimate can tell at all: observability.
+"""
 
 from northdown.evaluation.alignment import Alignment, AlignmentKind, align
 from northdown.evaluation.chi_square import chi2_bounds, nis
@@ -7,6 +10,9 @@ from northdown.evaluation.consistency_conditions import Conditions
 from northdown.evaluation.consistency_runs import ConsistencyResult, monte_carlo
 from northdown.evaluation.matching import Matched, Truth, match
 from northdown.evaluation.metrics import AttitudeError, ErrorSummary, attitude_error
+from northdown.evaluation.observability_analysis import observability
+from northdown.evaluation.observability_k06 import K06Configuration, k06_configurations
+from northdown.evaluation.observability_result import Observability, Unobservable
 
 __all__ = [
     "Alignment",
@@ -16,15 +22,20 @@ __all__ = [
     "ConsistencyResult",
     "Coverage",
     "ErrorSummary",
+    "K06Configuration",
     "Matched",
     "NormalizedError",
+    "Observability",
     "Truth",
+    "Unobservable",
     "align",
     "attitude_error",
     "chi2_bounds",
     "coverage",
+    "k06_configurations",
     "match",
     "monte_carlo",
     "nees",
     "nis",
+    "observability",
 ]

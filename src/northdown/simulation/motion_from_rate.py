@@ -62,6 +62,11 @@ class FromRate(Turning):
         self._next = quaternions.from_rotation(start)
         self.span = (self._origin, math.inf)
 
+    @property
+    def law(self) -> RateLaw:
+        """The rate and its derivative as a function of time."""
+        return self._rate
+
     def quat(self, time: FloatArray) -> FloatArray:
         """See `Turning`."""
         index: npt.NDArray[np.int64] = np.floor((time - self._origin) / self._step).astype(np.int64)
