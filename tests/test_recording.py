@@ -386,3 +386,53 @@ def test_an_empty_recording_has_all_its_methods() -> None:
     assert (len(empty), empty.duration) == (0, 0.0)
     assert len(empty.sort()) == len(empty.remap("y,-x,z")) == len(empty.between(0, 1)) == 0
     assert [f.kind for f in empty.check()] == ["time-few"]
+
+
+def test_shift_undoes_a_lag() -> None:
+    """Of a field that changes linearly, interpolation is exact."""
+    t = np.sort(np.random.default_rng(7).uniform(0.0, 2.0, 80))
+    field = np.column_stack([3.0 * t, 5.0 - t, 0.5 * t])
+    late = np.column_stack([3.0 * (t - 0.1), 5.0 - (t - 0.1), 0.5 * (t - 0.1)])
+    gyr = np.ones((80, 3))
+    moved = Recording(t, gyr, mag=late).shift("mag", -0.1)
+    there = ~np.isnan(moved.mag).any(axis=1)
+    assert moved.mag[there] == pytest.approx(field[there], abs=1e-12)
+    # the last tenth of a second has no samples any more; gaps, longer than two usual steps, are left out
+    assert not there[t > t[-1] - 0.1].any()
+    assert there[t <= t[-1] - 0.1].mean() > 0.5
+    assert np.array_equal(moved.gyr, gyr)
+    assert np.array_equal(moved.time, t)
+
+
+@pytest.mark.parametrize("sensor", ["acc", "mag"])
+def test_shift_by_whole_samples_moves_rows(sensor: str) -> None:
+    rng = np.random.default_rng(8)
+    value = rng.normal(size=(50, 3))
+    recording = Recording(np.arange(50) / 64.0, np.zeros((50, 3)), **{sensor: value})
+    moved = getattr(recording.shift(sensor, 3.0 / 64.0), sensor)
+    assert np.isnan(moved[:3]).all()
+    assert moved[3:] == pytest.approx(value[:-3], abs=1e-12)
+    same = getattr(recording.shift(sensor, 0.0), sensor)
+    assert np.array_equal(same, value)
+
+
+def test_shift_keeps_missing_samples_missing() -> None:
+    """A magnetometer at a fourth of the rate has samples in the same rows as before."""
+    value = np.full((80, 3), np.nan)
+    value[::4] = np.arange(20)[:, None]
+    moved = Recording(np.arange(80) * 0.01, np.zeros((80, 3)), mag=value).shift("mag", -0.02)
+    assert np.isnan(moved.mag[np.arange(80) % 4 > 0]).all()
+    assert moved.mag[:76:4, 0] == pytest.approx(np.arange(19) + 0.5, abs=1e-9)
+    assert np.isnan(moved.mag[76]).all()
+
+
+def test_shift_refuses_what_it_cannot_do() -> None:
+    recording = Recording(np.arange(10) * 0.1, np.zeros((10, 3)))
+    for attempt, match in (
+        (lambda: recording.shift("mag", 0.1), "a recording with mag"),
+        (lambda: recording.shift("gyr", 0.1), "sensor"),
+        (lambda: make().shift("mag", math.nan), "seconds"),
+        (lambda: make()[::-1].shift("mag", 0.1), "time that increases"),
+    ):
+        with pytest.raises(InputError, match=match):
+            attempt()

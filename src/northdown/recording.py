@@ -256,6 +256,41 @@ class Recording:
         movement = None if self.movement is None else np.interp(t, self.time, self.movement.astype(float)) > 0.5
         return replace(self, time=t, movement=movement, **fields)
 
+    def shift(self, sensor: Literal["acc", "mag"], seconds: float) -> Recording:
+        """Move the samples of one sensor in time against the others; undoes a lag.
+
+        Parameters
+        ----------
+        sensor : {"acc", "mag"}
+            Whose samples. The gyroscope's stay, as the others are held to them.
+        seconds : float
+            By how much its samples are later than it seems, s. Of a magnetometer that is late by 13 ms, which
+            `northdown.calibration.magnetometer_lag` finds, a sample belongs to 13 ms before its time stamp: −0.013.
+
+        Returns
+        -------
+        Recording
+            With the same times: what the sensor said there after the shift, by linear interpolation, which smooths
+            noise of successive samples. A row without a sample stays so; rows that the shift leaves without a
+            neighbour, at the ends and across gaps, become NaN.
+
+        Raises
+        ------
+        InputError
+            When there is no such sensor, or time does not increase.
+        """
+        value = getattr(self, check_choice("sensor", sensor, ("acc", "mag")))
+        seconds = check_number("seconds", seconds, unit="s")
+        if value is None:
+            raise InputError(expected(f"a recording with {sensor}", "one without"))
+        backwards = np.diff(self.time) <= 0.0
+        if backwards.any():
+            do = "sort the recording (Recording.sort()) and drop samples of equal time"
+            raise InputError(expected("time that increases", "a step back", at=int(np.argmax(backwards)) + 1, do=do))
+        moved = _interpolate(self.time, self.time + seconds, value, sampling_step(self.time))
+        moved[np.isnan(value).any(axis=1)] = np.nan
+        return replace(self, acc=moved) if sensor == "acc" else replace(self, mag=moved)
+
 
 def _interpolate(t: FloatArray, time: FloatArray, value: FloatArray, period: float) -> FloatArray:
     """Linear interpolation between the samples that are there; NaN across long gaps."""

@@ -8,11 +8,12 @@ from cal_truth import FIELD, HARD_IRON, chi2_bounds, directions, field_recording
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, minimize
 from scipy.spatial.transform import Rotation
 
 from northdown.calibration import calibrate_magnetometer
 from northdown.calibration._ellipsoid import curvature, ellipsoid_model, symmetric
+from northdown.calibration._solve import Prior
 from northdown.errors import InputError
 from northdown.recording import Recording
 
@@ -37,7 +38,7 @@ def test_without_noise_the_truth_is_exact() -> None:
 
 
 def test_sigma_is_honest() -> None:
-    seeds = 60
+    seeds = 30
     offsets, matrices = [], []
     for seed in range(seeds):
         part = calibrate_magnetometer(field_recording(directions(RNG(seed), 300), seed=seed)).mag
@@ -53,15 +54,15 @@ def test_sigma_is_honest() -> None:
 def test_sigma_of_half_a_sphere_is_honest_too() -> None:
     """Along the axis that half a sphere tells least of, where the fit's curvature bias would show."""
     errors = []
-    for seed in range(50):
+    for seed in range(25):
         unit = directions(RNG(seed), 500)
         unit[:, 2] = np.abs(unit[:, 2])
         part = calibrate_magnetometer(field_recording(unit, seed=seed), tolerance=0.1).mag
         assert part.evidence.model == "ellipsoid"
         errors.append((part.offset - HARD_IRON) / part.offset_sigma)
-    low, high = chi2_bounds(150)
+    low, high = chi2_bounds(75)
     assert low < np.mean(np.square(errors)) < high
-    assert np.abs(np.mean(errors, axis=0)).max() < 3.5 / np.sqrt(50)  # no bias: mean of unit normals
+    assert np.abs(np.mean(errors, axis=0)).max() < 3.5 / np.sqrt(25)  # no bias: mean of unit normals
 
 
 def test_a_given_field_is_the_size_of_calibrated_samples() -> None:
@@ -93,9 +94,9 @@ def test_planar_data_are_refused(normal: list[float], height: float, noise: floa
 
 
 def test_refusal_names_the_axis_that_is_not_known() -> None:
-    # a ring, 10° high, about y: y is told by the ring's bend alone
+    # a ring, 6° high, about y: y is told by the ring's bend alone
     unit = directions(RNG(4), 20_000)
-    unit = unit[np.abs(unit[:, 1]) < 0.08]
+    unit = unit[np.abs(unit[:, 1]) < 0.05]
     with pytest.raises(InputError, match=r"offset along y\b"):
         calibrate_magnetometer(field_recording(unit, noise=1.0))
 
@@ -125,8 +126,92 @@ def test_too_few_samples_are_refused_and_few_give_hard_iron_only() -> None:
     part = calibrate_magnetometer(field_recording(unit, soft=soft)).mag
     assert part.evidence.model == "sphere"
     assert np.array_equal(part.matrix, np.eye(3))
-    assert "45 directions are too few for soft iron" in part.evidence.notes[0]
+    assert any("soft iron needs 50 directions, there were 45" in note for note in part.evidence.notes)
     assert np.abs((part.offset - HARD_IRON) / part.offset_sigma).max() < 4.0
+
+
+def spiral(n: int) -> np.ndarray:
+    """Directions from pole to pole in 20 turns."""
+    angle = np.linspace(0.0, 40.0 * np.pi, n)
+    height = np.cos(np.linspace(0.05, np.pi - 0.05, n))
+    radius = np.sqrt(1.0 - height**2)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+
+
+def band(seed: int, height: float, n: int) -> np.ndarray:
+    """Directions within a band about the equator."""
+    unit = directions(RNG(seed), round(n / height))
+    return unit[np.abs(unit[:, 1]) < height]
+
+
+def test_soft_iron_that_is_hardly_seen_stays_small() -> None:
+    """On a band ±9° high, with errors that persist, the nine unknowns of an ellipsoid alone would run away."""
+    errors, sigmas = [], []
+    for seed in range(12):
+        unit = band(seed, 0.15, 300)
+        order = np.argsort(np.arctan2(unit[:, 2], unit[:, 0]))
+        recording = field_recording(unit[order], soft=np.eye(3), seed=seed)
+        uneven = 1.0 + 0.005 * np.sin(3.0 * np.arctan2(unit[order, 2], unit[order, 0]) + seed)
+        mag = (recording.mag - HARD_IRON) * uneven[:, None] + HARD_IRON
+        part = calibrate_magnetometer(Recording(recording.time, mag=mag)).mag
+        # 3 % (1-σ) is what soft iron is taken to be, and these data say less
+        assert np.abs(part.matrix - np.eye(3)).max() < 0.03
+        assert part.evidence.after < 0.2 * part.evidence.before
+        assert any("soft iron is hardly known" in note for note in part.evidence.notes)
+        errors.append((part.offset - HARD_IRON) / part.offset_sigma)
+        sigmas.append(part.offset_sigma[1])
+    assert np.mean(np.square(errors)) < 1.5  # σ are no understatement
+    assert 0.1 < np.mean(sigmas) < 2.5  # µT; along the band's axis
+
+
+def test_spread_over_parts_left_out() -> None:
+    part = calibrate_magnetometer(field_recording(directions(RNG(17), 1500))).mag
+    assert part.evidence.held_out_after == pytest.approx(0.5, rel=0.1)  # the noise, µT
+    size = np.linalg.norm(field_recording(directions(RNG(17), 1500)).mag, axis=1)
+    spread = 1.4826 * np.median(np.abs(size - np.median(size))) / np.median(size) * part.norm
+    assert part.evidence.held_out_before == pytest.approx(spread, rel=1e-3)
+
+
+def test_nothing_to_gain_is_said_and_not_refused() -> None:
+    """A sensor that needs no calibration: the fit is good, but makes nothing better."""
+    gained = []
+    for seed in range(8):
+        recording = field_recording(directions(RNG(seed), 800), hard=np.zeros(3), soft=np.eye(3), seed=seed)
+        evidence = calibrate_magnetometer(recording).mag.evidence
+        assert evidence.held_out_after == pytest.approx(evidence.held_out_before, rel=0.15)
+        gained.append(not any("nothing was gained" in note for note in evidence.notes))
+        assert gained[-1] == (evidence.held_out_after < evidence.held_out_before)
+    assert sum(gained) < len(gained)
+
+
+@pytest.mark.parametrize("size", [4.0, 8.0, 16.0, 24.0])
+def test_a_magnet_that_comes_later_is_refused(size: float) -> None:
+    """It is there for the second half: what suits one half spoils the other."""
+    once = spiral(1500)
+    recording = field_recording(np.vstack([once, once]), hard=np.zeros(3), soft=np.eye(3))
+    mag = np.array(recording.mag)
+    mag[1500:] += size * np.array([0.6, -0.64, 0.48])
+    with pytest.raises(InputError, match="a field that a correction makes more even"):
+        calibrate_magnetometer(Recording(recording.time, mag=mag), tolerance=0.2)
+
+
+def test_the_prior_is_that_of_students_t() -> None:
+    """Alternating unknowns and variance ends where the density itself is largest."""
+    freedom, scale, noise = 3.0, 0.03, 0.02
+    prior = Prior(np.zeros(5), np.eye(5), scale, freedom)
+    for size in (0.01, 0.1, 0.5):
+        seen = size * RNG(19).normal(size=5)
+
+        def cost(x: np.ndarray, seen: np.ndarray = seen) -> float:
+            tail = 0.5 * (freedom + 5.0) * np.log1p(x @ x / (freedom * scale**2))
+            return float(0.5 * ((x - seen) ** 2).sum() / noise**2 + tail)
+
+        best = minimize(cost, seen, method="BFGS", options={"gtol": 1e-9}).x
+        x = seen
+        for _ in range(300):
+            x = np.linalg.solve(np.eye(5) + noise**2 * prior.precision(x), seen)
+        assert x == pytest.approx(best, abs=1e-5)
+    assert np.linalg.norm(x) > 0.98 * np.linalg.norm(seen)  # of 0.5, clearly seen, next to nothing is lost
 
 
 def test_rotating_the_sensor_turns_the_result() -> None:
@@ -193,10 +278,7 @@ def test_several_recordings_and_missing_samples() -> None:
 
 def test_an_uneven_field_enlarges_the_sigma() -> None:
     """Errors that stay from one direction to the next do not average out, however many samples there are."""
-    angle = np.linspace(0.0, 40.0 * np.pi, 6000)
-    height = np.cos(np.linspace(0.05, np.pi - 0.05, 6000))
-    radius = np.sqrt(1.0 - height**2)
-    unit = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    unit = spiral(6000)
     # the first part shows in the residuals; the second is as large, but looks like hard iron
     uneven = 1.0 + 0.09 * unit[:, 0] * unit[:, 1] * unit[:, 2] + 0.015 * unit[:, 2]
     mag = FIELD * unit * uneven[:, None] + 0.1 * RNG(4).normal(size=unit.shape)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from northdown import InputError
@@ -32,6 +33,7 @@ from northdown.simulation import (
     steady,
     swing,
 )
+from northdown.simulation.imu_errors_lag import _FilteredNoise
 from northdown.simulation.imu_errors_noise import Gaps
 
 TURN = Motion(AboutAxis(Rotation.identity(), (1, 2, -2), steady(1.5)), Still(), 0.0, 20.0)
@@ -158,6 +160,25 @@ def test_filtered_noise_keeps_its_density_and_loses_its_height(order):
         # over 10 s the filter is of no account; 180 values have 5 % of scatter
         means = value[:60_000].reshape(60, 1000, 3).mean(axis=1)
         assert (means - means.mean(axis=0)).std() == pytest.approx(n / math.sqrt(10.0), rel=0.2)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("tick", [1e-3, 0.1, 0.6])
+def test_recursion_has_the_covariance_of_filtered_white_noise(order, tick):
+    """In closed form: an exponential, and a damped oscillation; from the first value on."""
+    denominator = [1.0, 1.0] if order == 1 else [1.0, math.sqrt(2.0), 1.0]
+    noise = _FilteredNoise(np.ones(3), denominator, tick, np.random.default_rng(1))
+    response = lfilter(noise._b, noise._a, np.concatenate([[1.0], np.zeros(round(60.0 / tick))]))
+    t = tick * np.array([0.0, 1.0, 2.0, 7.0])
+    y = t / math.sqrt(2.0)
+    expected = 0.5 * np.exp(-t) if order == 1 else np.exp(-y) * (np.cos(y) + np.sin(y)) / math.sqrt(8.0)
+    found = [response[: len(response) - k] @ response[k:] for k in (0, 1, 2, 7)]
+    assert found == pytest.approx(expected, rel=1e-8)
+    rng = np.random.default_rng(2)
+    starts = np.hstack([_FilteredNoise(np.ones(3), denominator, tick, rng).next(3) for _ in range(1000)])
+    # 3000 values: 2.6 % of scatter
+    assert (starts**2).mean(axis=1) == pytest.approx([expected[0]] * 3, rel=0.1)
+    assert (starts[0] * starts[2]).mean() == pytest.approx(expected[2], rel=0.1)
 
 
 def test_a_slower_sensor_has_nan_rows_and_values_of_its_own_times():

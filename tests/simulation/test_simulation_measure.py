@@ -226,7 +226,7 @@ def test_simulate_names_what_it_is_made_of():
         (lambda: simulate(10.0, rate=1e9), "rate between"),
         (lambda: simulate(float("nan")), "duration"),
         (lambda: simulate(2.0, seed=-1), "seed that is a whole number"),
-        (lambda: simulate(2.0, motion="walk"), "motion to be one of random, rest"),
+        (lambda: simulate(2.0, motion="fly"), "motion to be one of random, rest"),
         (lambda: simulate(2.0, sensors="mpu"), "preset to be one of perfect, low-cost"),
         (lambda: simulate(2.0, sensors=3), "name of sensors or SensorErrors, got int"),
         (lambda: simulate(2.0, motion=3), "a motion's name or a Motion, got int"),

@@ -68,8 +68,11 @@ def test_random_walk_grows_with_the_root_of_time():
 
 def test_three_coefficients_at_once():
     n, b, k = 1e-3, 4e-4, 4e-6
-    found = fit(samples(TriadErrors(noise=n, instability=b, walk=k), 2.0, 200_000.0), 2.0, (True, True, True))
-    assert found == pytest.approx([n, b, k], rel=0.1)
+    errors = TriadErrors(noise=n, instability=b, walk=k)
+    found = [fit(samples(errors, 2.0, 200_000.0, seed), 2.0, (True, True, True)) for seed in range(1, 7)]
+    assert found[0][:2] == pytest.approx([n, b], rel=0.1)
+    # a fit's K, told by a few clusters of the longest, scatters by 10 % and more
+    assert np.mean(found, axis=0) == pytest.approx([n, b, k], rel=0.1)
 
 
 def test_drift_is_the_true_bias_of_the_reference():
@@ -103,6 +106,29 @@ def test_every_preset_gives_its_own_coefficients_back(errors):
     alike = np.ptp(coefficients[0]) == 0.0
     for axes in [[0, 1, 2]] if alike else [[0], [1], [2]]:
         assert fit(values[:, axes], rate, which) == pytest.approx(coefficients[:, axes[0]], rel=0.1)
+
+
+def gauss_markov_variance(tau: np.ndarray, time: float) -> np.ndarray:
+    """Allan variance of a process of variance 1 and exponential correlation, in closed form."""
+    x = tau / time
+    return 2.0 / x * (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x))
+
+
+@pytest.mark.parametrize("errors", [*CASES, TriadErrors(noise=1e-3, instability=2e-3)])
+def test_default_flicker_noise_is_neither_too_slow_nor_too_short(errors):
+    """White noise and the sum of processes that stands for flicker noise, against N²/τ and the floor."""
+    n, b = errors.coefficients[0, 0], errors.coefficients[1, 0]
+    if not b:
+        return
+    shortest, longest = errors.correlation_times
+    steps = math.ceil(math.log(longest / shortest) / math.log(4.0))
+    times = np.geomspace(shortest, longest, steps + 1)
+    size = b * b * math.log(times[1] / times[0]) / math.pi
+    tau = np.geomspace(0.01, 1000.0, 60)
+    variance = n * n / tau + size * sum(gauss_markov_variance(tau, t) for t in times)
+    deviation = np.sqrt(variance / (n * n / tau + (FLOOR * b) ** 2))
+    # what is left out at both ends is 2 %, and a little more on an axis that is better than the worst
+    assert np.abs(deviation - 1.0).max() < 0.03
 
 
 def test_quantisation_of_the_coarsest_preset_is_within_a_tenth():

@@ -8,7 +8,7 @@ each with a known σ, cannot; see `northdown.calibration._known_noise`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +93,9 @@ def _tukey(scale: float) -> Cost:
     def cost(residual: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         u = np.minimum((residual / (_TUKEY * scale)) ** 2, 1.0)
         inside = 1.0 - u
-        return float((1.0 - inside**3).sum()), inside**2, inside * (1.0 - 5.0 * u)
+        # in the unit of ½ Σ r², which it is for small residuals
+        value = (_TUKEY * scale) ** 2 / 6.0 * float((1.0 - inside**3).sum())
+        return value, inside**2, inside * (1.0 - 5.0 * u)
 
     return cost
 
@@ -107,13 +109,54 @@ def _curvature(jacobian: FloatArray, weight: FloatArray, slope: FloatArray) -> F
     return true if np.linalg.eigvalsh(true)[0] > 0.1 * np.linalg.eigvalsh(plain)[0] else plain
 
 
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the unknowns beforehand: `root` · (x − `mean`) is about 0, each row with its 1-σ `scale`.
+
+    Its tails are those of Student's t with `freedom` degrees of freedom, so that the data may contradict it: what
+    they say clearly is hardly shrunk. The largest posterior is found by alternating it with the variance (Lange,
+    Little, Taylor, J. Am. Stat. Assoc. 84, 1989).
+    """
+
+    mean: FloatArray
+    root: FloatArray
+    scale: float
+    freedom: float
+    counts: bool = True
+    """Whether it makes the unknowns more certain. One that does not only shrinks them."""
+
+    def precision(self, x: FloatArray) -> FloatArray:
+        """Inverse covariance (P, P) at these unknowns."""
+        off = self.root @ (x - self.mean)
+        variance = (self.freedom * self.scale**2 + float(off @ off)) / (self.freedom + len(off))
+        result: FloatArray = self.root.T @ self.root / variance
+        return result
+
+
 def descend(
-    model: Model, x: FloatArray, cost: Cost, valid: Callable[[FloatArray], bool] | None = None
+    model: Model,
+    x: FloatArray,
+    cost: Cost,
+    valid: Callable[[FloatArray], bool] | None = None,
+    pull: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Levenberg–Marquardt to convergence; returns the unknowns, residuals and derivatives there."""
+    """Levenberg–Marquardt to convergence; returns the unknowns, residuals and derivatives there.
+
+    The cost grows by ½ (x − m)ᵀ M (x − m) where `pull` is (m, M).
+    """
+    mean, matrix = pull if pull is not None else (x, np.zeros((len(x), len(x))))
+
+    def total(x: FloatArray, residual: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        value, weight, slope = cost(residual)
+        return value + 0.5 * float((x - mean) @ matrix @ (x - mean)), weight, slope
+
+    def derivatives(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        gradient = jacobian.T @ (weight * residual) + matrix @ (x - mean)
+        return _curvature(jacobian, weight, slope) + matrix, gradient
+
     residual, jacobian = model(x)
-    value, weight, slope = cost(residual)
-    hessian, gradient = _curvature(jacobian, weight, slope), jacobian.T @ (weight * residual)
+    value, weight, slope = total(x, residual)
+    hessian, gradient = derivatives(x)
     damping = 1e-4
     for _ in range(60):
         diagonal = np.diag(hessian) + 1e-12 * max(float(np.trace(hessian)), 1e-300)
@@ -124,10 +167,10 @@ def descend(
                 raise NoFitError
             continue
         new_residual, new_jacobian = model(x + step)
-        new_value, weight, slope = cost(new_residual)
+        new_value, weight, slope = total(x + step, new_residual)
         if np.isfinite(new_value) and new_value <= value:
             x, value, residual, jacobian = x + step, new_value, new_residual, new_jacobian
-            hessian, gradient = _curvature(jacobian, weight, slope), jacobian.T @ (weight * residual)
+            hessian, gradient = derivatives(x)
             damping = max(damping * 0.1, 1e-12)
         else:
             damping *= 10.0
@@ -146,6 +189,7 @@ def robust(
     shared: int = 0,
     all_persistent: bool = False,
     valid: Callable[[FloatArray], bool] | None = None,
+    priors: Sequence[Prior] = (),
 ) -> Solution:
     """Fit with Tukey's weights; the scale of the noise is found from the residuals.
 
@@ -165,6 +209,8 @@ def robust(
         Take the residuals for persistent errors altogether, where neighbours do not tell.
     valid : callable
         Whether unknowns are sensible; steps that lead to others are shortened.
+    priors : sequence of Prior
+        What is known beforehand, with one `mean`. It weighs as its σ says beside data whose errors persist.
 
     Returns
     -------
@@ -177,25 +223,39 @@ def robust(
     NoFitError
         When the iteration ends where even the shortest step leaves what is valid.
     """
-    scale = max(robust_scale(prepare(x, floor)(x)[0], len(x)), floor)
+    n, p = len(prepare(x, floor)(x)[0]), len(x)
+    apart = components * (1 + shared)
+    scale = max(robust_scale(prepare(x, floor)(x)[0], p), floor)
+    pull, noise = np.zeros((p, p)), 0.0
     for _ in range(30):
         if not scale < _LARGEST_SCALE:
             raise NoFitError
-        x, residual, jacobian = descend(prepare(x, scale), x, _tukey(scale), valid)
-        new = max(robust_scale(residual, len(x)), floor)
+        given = (priors[0].mean, pull) if priors else None
+        x, residual, jacobian = descend(prepare(x, scale), x, _tukey(scale), valid, given)
+        new = max(robust_scale(residual, p), floor)
         settled = abs(new - scale) <= 1e-7 * scale
         scale = new
+        _, weight, slope = _tukey(scale)(residual)
+        persistent = scale if all_persistent else _persistent(residual, weight, scale, apart)
+        # variance of one residual as if they were independent
+        noise = scale**2 + n * persistent**2 / _INDEPENDENT
+        if priors:
+            new_pull = noise * np.sum([prior.precision(x) for prior in priors], axis=0)
+            settled = settled and bool(np.abs(new_pull - pull).max() <= 1e-5 * np.abs(new_pull).max())
+            pull = new_pull
         if settled:
             break
-    _, weight, slope = _tukey(scale)(residual)
-    persistent = scale if all_persistent else _persistent(residual, weight, scale, components * (1 + shared))
     plain = (jacobian * weight[:, None]).T @ jacobian
-    bread = inverse(_curvature(jacobian, weight, slope))
+    counted = np.zeros((p, p))
+    for prior in priors:
+        counted += noise * prior.precision(x) if prior.counts else 0.0
+    bread = inverse(_curvature(jacobian, weight, slope) + counted)
     covariance = bread
     if np.isfinite(bread).all():
-        score = (jacobian * (weight * residual)[:, None]).reshape(-1, components, len(x)).sum(axis=1)
-        covariance = bread @ _meat(score, shared) @ bread
-        covariance = covariance + (len(residual) * persistent**2 / _INDEPENDENT) * inverse(plain)
+        score = (jacobian * (weight * residual)[:, None]).reshape(-1, components, p).sum(axis=1)
+        covariance = bread @ (_meat(score, shared) + noise * counted) @ bread
+        from_errors = bread @ plain @ bread if priors else inverse(plain)
+        covariance = covariance + (n * persistent**2 / _INDEPENDENT) * from_errors
     return Solution(x, covariance, scale, weight, persistent, condition(plain))
 
 

@@ -6,8 +6,14 @@ correction is known up to a rotation, so the matrix is taken symmetric: of all t
 turns vectors least, and it does not depend on how the axes are named. What rotation remains is found by
 `align_magnetometer`.
 
+Few recordings see all directions, and no field indoors is quite even. So hard and soft iron have priors: they are
+small (3 % of the field, 1-σ) unless the data say otherwise. Where they say little there is hardly any soft iron,
+and where they say nothing it leaves a sensor that was calibrated before as it is. Whether the result is any good
+is then measured on parts of the recording that were left out.
+
 Sources: V. Renaudin, M. H. Afzal, G. Lachapelle, J. Sensors 2010, 967245 (ellipsoid model); P. D. Sampson, CGIP 18,
-1982 (distance); Maronna, Martin, Yohai, Robust Statistics, 2006 (MM estimator and its covariance).
+1982 (distance); Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 17.2 (Student's t as a prior); Maronna,
+Martin, Yohai, Robust Statistics, 2006 (MM estimator and its covariance).
 """
 
 from __future__ import annotations
@@ -18,7 +24,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from northdown._validation import FloatArray, check_number
-from northdown.calibration._ellipsoid import weakest
+from northdown.calibration._ellipsoid import Sphere, weakest
+from northdown.calibration._held_out import HeldOut, held_out
 from northdown.calibration._inputs import axis_words, gather
 from northdown.calibration._magnetometer_fit import (
     FEWEST_ELLIPSOID,
@@ -31,6 +38,7 @@ from northdown.calibration._magnetometer_fit import (
 from northdown.calibration.coverage import Coverage, coverage
 from northdown.calibration.model import Calibration
 from northdown.calibration.part import Evidence, SensorCalibration
+from northdown.calibration.words import SHOWN
 from northdown.errors import InputError, expected
 from northdown.recording import Recording
 
@@ -39,13 +47,21 @@ _FEWEST_USED, _MOST_SPREAD = 0.6, 0.1
 _LEAST_SPREAD = 0.05  # below this share of its mean the field may as well be noise about one direction
 # 1-σ of the offset (relative to the field) from which on nothing is known.
 _HOPELESS = 0.3
+# 1-σ of a sphere's centre (relative) from which on an ellipsoid is not tried: it would run away.
+_FLAT = 1.0
+# 1-σ of the offset (relative to the field) above which the user is told.
+_WELL_KNOWN = 0.02
+# Ratio of spreads that may differ from 1 by chance.
+_BY_CHANCE = 1.1
+# σ of the matrix that comes from the prior more than from the data, which have at most 1.5 % left of it.
+_HARDLY_KNOWN = 0.01
 
 
 def calibrate_magnetometer(
     recording: Recording | Sequence[Recording],
     *,
     field: float | None = None,
-    tolerance: float = 0.02,
+    tolerance: float = 0.05,
 ) -> Calibration:
     """Hard and soft iron of a magnetometer that was turned about in a constant field.
 
@@ -57,26 +73,28 @@ def calibrate_magnetometer(
         Size of the local field in the recording's unit, such as the World Magnetic Model gives. When not given, the
         size is kept: it becomes the geometric mean of the ellipsoid's semi-axes.
     tolerance : float
-        Largest predicted 1-σ of the offset (relative to the field) and of the matrix's elements that is
-        accepted. With a larger one less complete turning is accepted.
+        Largest predicted 1-σ of the offset (relative to the field) that is accepted. A larger one accepts less
+        complete turning; an offset of 5 % that is wrong turns the heading by up to 7° where the dip is 65°.
 
     Returns
     -------
     Calibration
-        Its part `mag`. When the directions suffice for a sphere but not for an ellipsoid, only hard iron is
-        corrected; ``evidence.model`` says ``"ellipsoid"`` or ``"sphere"``, and a note says why.
+        Its part `mag`. ``evidence.model`` is ``"ellipsoid"``, or ``"sphere"`` when there were too few directions for
+        more than hard iron. ``evidence.held_out_before`` and ``held_out_after`` are the spread of the field's size
+        over parts of the recording that were left out; the notes say what to know of it.
 
     Raises
     ------
     InputError
         When the directions do not fix the offset (turned in one plane, about one axis, too little, too few
-        samples), or the field was not constant.
+        samples); when the field was not constant; or when the correction does not make the field's size more even
+        over the parts left out, unless the sensor evidently needs none.
 
     Notes
     -----
     Successive samples from one direction (2°) count as one point. Up to some 40 % of points, such as a
     walk past iron, may be disturbed. The σ are those of the fit with residuals as they are, correlation in time
-    included.
+    and the prior on soft iron included. The prior on hard iron makes no σ smaller: what only it decides is uncertain.
     """
     tolerance = check_number("tolerance", tolerance, above=0.0, high=0.2)
     recordings = gather(recording, ("mag",))
@@ -85,15 +103,23 @@ def calibrate_magnetometer(
         field = check_number("field", field, above=0.0, unit=unit)
     points, rough = gather_points(recordings)
     _check_turned(points)
-    sphere = fit_sphere(points, rough)
-    ellipsoid = fit_ellipsoid(points, sphere) if sphere and len(points) >= FEWEST_ELLIPSOID else None
-    why_not = _why_not_ellipsoid(ellipsoid, tolerance, len(points))
-    fitted = sphere if why_not else ellipsoid
-    refusal = _why_not_sphere(sphere, tolerance, unit) if why_not else ""
+    fitted = _fit(points, rough)
+    refusal = _why_not(fitted, tolerance, unit)
     if refusal or fitted is None:
         raise InputError(refusal)
     _check_field(fitted, points)
-    return Calibration(mag=_part(fitted, points, unit, field, why_not))
+    proof = held_out(points, fitted)
+    if not (proof.gains or _needs_none(fitted, proof)):
+        raise InputError(_no_gain(proof))
+    return Calibration(mag=_part(fitted, points, unit, field, proof))
+
+
+def _fit(points: FloatArray, rough: Sphere) -> Fitted | None:
+    """Ellipsoid where there are points enough, else sphere; none, or a hopeless sphere, for a flat set of points."""
+    sphere = fit_sphere(points, rough)
+    if sphere is None or len(points) < FEWEST_ELLIPSOID or not weakest(sphere.solution)[1] < _FLAT:
+        return sphere
+    return fit_ellipsoid(points, sphere)
 
 
 def _check_turned(points: FloatArray) -> None:
@@ -105,7 +131,7 @@ def _check_turned(points: FloatArray) -> None:
         raise InputError(expected("a magnetometer turned into directions all around", got, do=HOW))
 
 
-def _why_not_sphere(fitted: Fitted | None, tolerance: float, unit: str) -> str:
+def _why_not(fitted: Fitted | None, tolerance: float, unit: str) -> str:
     """Message of refusal when the offset isn't known well enough; empty when it is."""
     direction, sigma = (np.full(3, np.nan), math.inf) if fitted is None else weakest(fitted.solution)
     if sigma <= tolerance:
@@ -123,19 +149,19 @@ def _why_not_sphere(fitted: Fitted | None, tolerance: float, unit: str) -> str:
     return expected("a magnetometer turned into directions all around", got, do=do)
 
 
-def _why_not_ellipsoid(fitted: Fitted | None, tolerance: float, points: int) -> str:
-    """Note on why only hard iron was corrected; empty when soft iron is known well enough."""
-    only = "only hard iron was corrected: "
-    if points < FEWEST_ELLIPSOID:
-        return only + f"{points} directions are too few for soft iron, {FEWEST_ELLIPSOID} are needed"
-    if fitted is None:
-        return only + "the directions fix no ellipsoid; turn about all three axes for soft iron"
-    sigma = float(fitted.matrix_sigma.max())
-    if sigma > tolerance:
-        return only + f"soft iron would be uncertain to {100.0 * sigma:.1f} %; turn about all three axes for it"
-    if weakest(fitted.solution)[1] > tolerance:
-        return only + "an ellipsoid would leave the offset uncertain; turn about all three axes for soft iron"
-    return ""
+def _needs_none(fitted: Fitted, proof: HeldOut) -> bool:
+    """Whether nothing is gained because the sensor is right already, which the data show well."""
+    sigma = weakest(fitted.solution)[1]
+    no_offset = float(np.linalg.norm(fitted.offset)) <= 3.0 * sigma * fitted.radius
+    return sigma <= _WELL_KNOWN and no_offset and proof.after <= _BY_CHANCE * proof.before
+
+
+def _no_gain(proof: HeldOut) -> str:
+    """Message for a correction that does not help."""
+    after = f"{100.0 * proof.after:.2g} %" if math.isfinite(proof.after) else "no fit"
+    got = f"a spread of its size over parts left out of the fit of {100.0 * proof.before:.2g} % before, {after} after"
+    do = "turn the sensor about all three axes in one place, away from iron and magnets that move"
+    return expected("a field that a correction makes more even", got, do=do)
 
 
 def _check_field(fitted: Fitted, points: FloatArray) -> None:
@@ -149,8 +175,9 @@ def _check_field(fitted: Fitted, points: FloatArray) -> None:
     raise InputError(expected("a field of constant size", got, do=do))
 
 
-def _part(fitted: Fitted, points: FloatArray, unit: str, field: float | None, why_not: str) -> SensorCalibration:
+def _part(fitted: Fitted, points: FloatArray, unit: str, field: float | None, proof: HeldOut) -> SensorCalibration:
     scale = 1.0 if field is None else field / fitted.radius
+    norm = fitted.radius if field is None else field
     kept = fitted.solution.weights > 0.0
     before = float(np.linalg.norm(points[kept], axis=1).std())
     corrected = (points - fitted.offset) @ fitted.matrix.T
@@ -167,7 +194,7 @@ def _part(fitted: Fitted, points: FloatArray, unit: str, field: float | None, wh
         fitted.offset_sigma,
         sigma,
         unit,
-        fitted.radius if field is None else field,
+        norm,
         None,
         Evidence(
             fitted.model,
@@ -179,14 +206,25 @@ def _part(fitted: Fitted, points: FloatArray, unit: str, field: float | None, wh
             fitted.solution.used,
             seen.share,
             fitted.solution.condition,
-            tuple(_notes(fitted, seen, after / (scale * fitted.radius), why_not)),
+            tuple(_notes(fitted, seen, after / (scale * fitted.radius), unit, proof)),
+            proof.before * norm,
+            proof.after * norm if math.isfinite(proof.after) else math.nan,
         ),
     )
 
 
-def _notes(fitted: Fitted, seen: Coverage, spread: float, why_not: str) -> Iterator[str]:
-    if why_not:
-        yield why_not
+def _notes(fitted: Fitted, seen: Coverage, spread: float, unit: str, proof: HeldOut) -> Iterator[str]:
+    count = len(fitted.solution.weights)
+    direction, sigma = weakest(fitted.solution)
+    if sigma > _WELL_KNOWN:
+        size = f"{sigma * fitted.radius:.2g} {SHOWN[unit][0]}, {100.0 * sigma:.1f} % of the field"
+        yield f"the offset along {axis_words(direction)} is uncertain to {size} (1-σ): turn more about all axes"
+    if fitted.model == "sphere":
+        yield f"only hard iron was corrected: soft iron needs {FEWEST_ELLIPSOID} directions, there were {count}"
+    elif fitted.matrix_sigma.max() > _HARDLY_KNOWN:
+        yield f"soft iron is hardly known (± {100.0 * fitted.matrix_sigma.max():.1f} %) and was kept small"
+    if not proof.gains:
+        yield "nothing was gained: over parts left out of the fit the field's size is as uneven as before"
     if fitted.solution.used < 0.95:
         yield f"{100.0 * (1.0 - fitted.solution.used):.0f} % of the directions were left out as disturbed"
     if spread > 0.03:

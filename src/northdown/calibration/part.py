@@ -42,6 +42,9 @@ class Evidence:
         Condition number of the fit; NaN where there was none. Some tens are good.
     notes : tuple of str
         What the user should know, in words.
+    held_out_before, held_out_after : float
+        Robust standard deviation, of the same quantity, without and with a correction over parts that were left out
+        when it was made, each part in turn; NaN where this was not tried.
     """
 
     model: str
@@ -54,6 +57,8 @@ class Evidence:
     coverage: float = math.nan
     condition: float = math.nan
     notes: tuple[str, ...] = ()
+    held_out_before: float = math.nan
+    held_out_after: float = math.nan
 
     def __eq__(self, other: object) -> bool:
         # NaN stands for 'no number' here, and equals itself

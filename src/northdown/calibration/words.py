@@ -17,7 +17,7 @@ _WIDTH: Final = 80
 _TITLES: Final = {"gyr": "Gyroscope", "acc": "Accelerometer", "mag": "Magnetometer"}
 _OFFSETS: Final = {"gyr": "Bias", "acc": "Offset", "mag": "Hard iron"}
 # How values are shown: unit as written in files, unit as shown, factor.
-_SHOWN: Final = {
+SHOWN: Final = {
     "rad/s": ("°/s", math.degrees(1.0)),
     "rad": ("°", math.degrees(1.0)),
     "m/s^2": ("m/s²", 1.0),
@@ -36,7 +36,7 @@ def describe(calibration: Calibration) -> str:
 
 def rows(part: SensorCalibration) -> list[tuple[str, str]]:
     """What was found, without the evidence, as labelled lines; an empty label goes on with the one before."""
-    unit, factor = _SHOWN[part.unit]
+    unit, factor = SHOWN[part.unit]
     found = [(_TITLES[part.sensor], part.evidence.model)]
     label = _OFFSETS[part.sensor]
     for axis, value, sigma in zip("xyz", factor * part.offset, factor * part.offset_sigma, strict=True):
@@ -67,10 +67,17 @@ def evidence_rows(evidence: Evidence) -> list[tuple[str, str]]:
     """Residual before and after, coverage and condition, as labelled lines."""
     found = []
     if evidence.quantity:
-        unit, factor = _SHOWN.get(evidence.unit, (evidence.unit, 1.0))
+        unit, factor = SHOWN.get(evidence.unit, (evidence.unit, 1.0))
         before, after = factor * evidence.before, factor * evidence.after
         digits = _digits(min(before, after) if after > 0.0 else before)
         found.append(("Residual", f"{before:.{digits}f} → {after:.{digits}f} {unit}  ({evidence.quantity})"))
+    if math.isfinite(evidence.held_out_after):
+        unit, factor = SHOWN.get(evidence.unit, (evidence.unit, 1.0))
+        before, after = factor * evidence.held_out_before, factor * evidence.held_out_after
+        digits = _digits(min(before, after) if after > 0.0 else before)
+        found.append(
+            ("Held out", f"{before:.{digits}f} → {after:.{digits}f} {unit}  (over parts left out of the fit)")
+        )
     if evidence.samples:
         kept = "" if evidence.used == 1.0 else f", {100.0 * evidence.used:.0f} % kept"
         found.append(("Fit of", f"{evidence.samples} observations{kept}"))

@@ -54,7 +54,7 @@ def calibrate(
     tolerance: Annotated[
         str | None,
         typer.Option(
-            "--tolerance", metavar="SHARE", help="Accept a larger uncertainty (1-σ) than usual, such as 0.05."
+            "--tolerance", metavar="SHARE", help="Accept a larger uncertainty (1-σ) than usual, such as 0.1."
         ),
     ] = None,
     plot: Annotated[

@@ -49,6 +49,7 @@ class Bench:
         self._timing = Timing(self._clock, errors, seed)
         self._last: FloatArray = np.zeros(0)
         self._last_quat: FloatArray = np.zeros((4, 0))
+        self._other: tuple[FloatArray, FloatArray] = self._last, self._last_quat
         signals = ((errors.gyr, self._mean_rate), (errors.acc, self._delayed_force), (errors.mag, self._magnetic))
         self._channels: list[Channel | None] = []
         for sensor, (own, signal) in enumerate(signals):
@@ -111,11 +112,13 @@ class Bench:
         self._last, self._last_quat = time, self._motion.turning.quat(self._inside(time))
 
     def _quat(self, time: FloatArray) -> FloatArray:
-        """Attitude (4, N); that of the block's instants is made once for all sensors."""
-        skip = len(self._last) - len(time)
-        if skip in (0, 1) and np.array_equal(self._last[skip:], time):
-            return self._last_quat[:, skip:]
-        return self._motion.turning.quat(self._inside(time))
+        """Attitude (4, N); that of the block's instants is made once for all sensors, that of filters' ticks too."""
+        for known, quat in ((self._last, self._last_quat), self._other):
+            skip = len(known) - len(time)
+            if skip in (0, 1) and np.array_equal(known[skip:], time):
+                return quat[:, skip:]
+        self._other = time, self._motion.turning.quat(self._inside(time))
+        return self._other[1]
 
     def _mean_rate(self, edges: FloatArray) -> FloatArray:
         delay = self._errors.gyr.delay if self._errors.gyr is not None else 0.0
@@ -136,7 +139,7 @@ class Bench:
         return self._force(time - delay if delay else time)
 
     def _force(self, time: FloatArray) -> FloatArray:
-        free = self._motion.path.evaluate(self._inside(time))[2] - self._gravity
+        free = self._motion.path.acceleration(self._inside(time)) - self._gravity
         if not self._position.any():
             return np.ascontiguousarray(quaternions.rotate_inverse(self._quat(time), free).T)
         quat, rate, acceleration = self._motion.turning.evaluate(self._inside(time))

@@ -105,32 +105,37 @@ class Lag:
 class _FilteredNoise:
     """White noise behind a filter, at regular ticks.
 
-    With ẋ = A x + b w in the modes of A, poles λᵢ, all is known: x at the next tick is exp(λᵢ Δ) xᵢ plus noise of the
-    covariance bᵢ b̄ⱼ (exp((λᵢ + λ̄ⱼ) Δ) − 1)/(λᵢ + λ̄ⱼ), and at the start the same for infinite Δ.
+    With poles λᵢ and rᵢ the residues of the filter, noise has the covariance Σ −rᵢ r̄ⱼ exp(λᵢ t)/(λᵢ + λ̄ⱼ) over a time
+    t. At ticks Δ apart that is an autoregressive process of the filter's order, with poles exp(λᵢ Δ), driven by a
+    moving average of white noise over one tick less (P. J. Brockwell, Handbook of Statistics 19, 2001, chapter 9).
     """
 
     def __init__(self, size: FloatArray, denominator: list[float], tick: float, rng: np.random.Generator) -> None:
         self._size, self._rng = size, rng
         poles = np.roots(denominator)
         # partial fractions of H(s) = d_n/Π(s − λᵢ): its response to an impulse is Σ rᵢ exp(λᵢ t)
-        weights = [denominator[-1] / np.prod([p - q for q in poles if q != p]) for p in poles]
-        self._decay = np.exp(poles * tick)
+        residues = [denominator[-1] / np.prod([p - q for q in poles if q != p]) for p in poles]
+        decay = np.exp(poles * tick)
         pairs = poles[:, None] + poles.conj()[None, :]
-        shape = np.outer(weights, np.conj(weights)) / pairs
-        self._mix = self._root(shape * np.expm1(pairs * tick))
-        self._state = self._root(-shape) @ rng.standard_normal((len(poles), 3))
-
-    @staticmethod
-    def _root(covariance: Any) -> Any:
-        """Matrix of as many real columns as modes whose modes' sum has this covariance.
-
-        The modes come in conjugate pairs, so that the real processes Re x₁ and Im x₁ carry all of it.
-        """
-        if len(covariance) == 1:
-            return np.sqrt(covariance)
-        to_real = np.array([[0.5, 0.5], [-0.5j, 0.5j]])
-        real = (to_real @ covariance @ to_real.conj().T).real
-        return np.linalg.inv(to_real) @ np.linalg.cholesky(real)
+        shape = np.outer(residues, np.conj(residues)) / pairs
+        self._a: FloatArray = np.real(np.poly(decay)).astype(np.float64)
+        # the modes' steps, of covariance `step`, are driven together: what drives their sum is a moving average
+        step = shape * np.expm1(pairs * tick)
+        other = decay[::-1] if len(decay) == 2 else np.zeros(1)
+        now, then = float(step.sum().real), float((other @ step @ other.conj()).real)
+        between = -float((step @ other.conj()).sum().real)
+        ratio = between / (now + then)
+        theta = 2.0 * ratio / (1.0 + math.sqrt(max(0.0, 1.0 - 4.0 * ratio * ratio)))
+        variance = (now + then) / (1.0 + theta * theta)
+        self._b: FloatArray = math.sqrt(variance) * np.array([1.0, theta])[: len(poles)]
+        # the filter's state is what is known of the next value, and −a₂ times the last one
+        covariance = np.array([[-float(shape.sum().real) - variance]])
+        if len(poles) == 2:
+            height, next_to = (-float((np.exp(poles * t) @ shape).sum().real) for t in (0.0, tick))
+            cross = -self._a[2] * next_to
+            covariance = np.array([[height - variance, cross], [cross, self._a[2] ** 2 * height]])
+        values, vectors = np.linalg.eigh(covariance)
+        self._state: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0)) @ rng.standard_normal((len(poles), 3))
 
     def next(self, count: int) -> FloatArray:
         """Noise (count, 3) at the next ticks."""
@@ -138,10 +143,7 @@ class _FilteredNoise:
 
         if not self._size.any():
             return np.zeros((count, 3))
-        drive = self._mix @ self._rng.standard_normal((count, len(self._decay), 3))
-        total = np.zeros((count, 3))
-        for k, decay in enumerate(self._decay):
-            mode, _ = lfilter([1.0], [1.0, -decay], drive[:, k], axis=0, zi=decay * self._state[k : k + 1])
-            self._state[k] = mode[-1]
-            total += mode.real
-        return self._size * total
+        noise: FloatArray
+        noise, self._state = lfilter(self._b, self._a, self._rng.standard_normal((count, 3)), axis=0, zi=self._state)
+        noise *= self._size
+        return noise

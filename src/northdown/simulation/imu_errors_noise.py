@@ -97,7 +97,7 @@ class Drift:
                 level = _Level(step, decay, size * math.sqrt(1.0 - decay * decay), first, rng, level)
         if walk.any():
             # on the finest grid: what is slower is interpolated, which would smooth a walk
-            step = shortest / _PER_TIME
+            step = (shortest if instability.any() else 1.0) / _PER_TIME
             level = _Level(step, 1.0, walk * math.sqrt(step), np.zeros(3), generator(seed, *purpose, 0), level)
         self._level = level
 

@@ -77,6 +77,10 @@ class Path(ABC):
     def evaluate(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Position (m), velocity (m/s) and acceleration (m/s²) in NED, each (3, N), at times (N,) in s."""
 
+    def acceleration(self, time: FloatArray) -> FloatArray:
+        """Acceleration alone, (3, N); laws that can do this faster override it."""
+        return self.evaluate(time)[2]
+
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:

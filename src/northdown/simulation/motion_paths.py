@@ -85,3 +85,9 @@ class SplinePath(Path):
             np.where(moving, self._rate(inside).T, 0.0),
             np.where(moving, self._acceleration(inside).T, 0.0),
         )
+
+    def acceleration(self, time: FloatArray) -> FloatArray:
+        """See `Path`."""
+        inside = np.clip(time, self._first, self._last)
+        acceleration: FloatArray = np.where(inside == time, self._acceleration(inside).T, 0.0)
+        return acceleration
