@@ -30,6 +30,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from northdown.arrays import AccelerometerArray
 from northdown.errors import FormatError, InputError, MissingDependencyError, NorthdownError
 from northdown.orientation import Flag, Orientation
 from northdown.recording import Recording
@@ -37,6 +38,7 @@ from northdown.recording import Recording
 if TYPE_CHECKING:
     # For editors and type checkers only. At run time estimators are found by their files, see `__getattr__`.
     from northdown import (
+        arrays,
         calibration,
         datasets,
         estimators,
@@ -61,14 +63,15 @@ if TYPE_CHECKING:
     from northdown.estimators.tilt_compass import TiltCompass
     from northdown.estimators.triad import Triad
     from northdown.evaluation import align, attitude_error, observability
-    from northdown.io import read, read_orientation, write_orientation, write_recording
+    from northdown.io import read, read_array, read_orientation, write_array, write_orientation, write_recording
     from northdown.navigation import Trajectory, navigate
-    from northdown.simulation import simulate
+    from northdown.simulation import simulate, simulate_array
 
 __version__ = "0.1.0"
 
 __all__ = [
     "MEKF",
+    "AccelerometerArray",
     "Complementary",
     "CrossProduct",
     "DoubleStageEKF",
@@ -89,6 +92,7 @@ __all__ = [
     "Trajectory",
     "Triad",
     "align",
+    "arrays",
     "attitude_error",
     "calibration",
     "datasets",
@@ -102,14 +106,18 @@ __all__ = [
     "observability",
     "plots",
     "read",
+    "read_array",
     "read_orientation",
     "simulate",
+    "simulate_array",
     "simulation",
+    "write_array",
     "write_orientation",
     "write_recording",
 ]
 
 _MODULES = (
+    "arrays",
     "calibration",
     "datasets",
     "estimators",
@@ -128,8 +136,11 @@ _HOMES = {
     "navigate": "navigation",
     "observability": "evaluation",
     "read": "io",
+    "read_array": "io",
     "read_orientation": "io",
     "simulate": "simulation",
+    "simulate_array": "simulation",
+    "write_array": "io",
     "write_orientation": "io",
     "write_recording": "io",
 }

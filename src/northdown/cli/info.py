@@ -9,8 +9,10 @@ import typer
 
 from northdown.cli import console
 from northdown.cli.reading import Reading, reads_recording
+from northdown.errors import InputError
 
 if TYPE_CHECKING:
+    from northdown.arrays import AccelerometerArray
     from northdown.recording import Recording
 
 
@@ -45,6 +47,9 @@ def as_dict(reading: Reading, recording: Recording) -> dict[str, Any]:
         "duration": recording.duration,
         "rate": recording.rate,
         "sensors": {sensor: {"missing": share} for sensor, share in missing(recording).items()},
+        "array": None
+        if recording.array is None
+        else {"name": recording.array.name, "channels": list(recording.array.names)},
         "mag_unit": recording.mag_unit if recording.mag is not None else None,
         "frame": recording.frame,
         "reference": None
@@ -73,7 +78,7 @@ def missing(recording: Recording) -> dict[str, float]:
 
     return {
         sensor: float(np.isnan(getattr(recording, sensor)).any(axis=1).mean()) if len(recording) else 0.0
-        for sensor in ("gyr", "acc", "mag")
+        for sensor in ("gyr", "acc", "mag", "array_acc")
         if getattr(recording, sensor) is not None
     }
 
@@ -86,13 +91,28 @@ def _facts(reading: Reading, recording: Recording) -> list[tuple[str, str]]:
     for sensor, share in missing(recording).items():
         there = "every sample" if share == 0.0 else f"{_percent(share)} missing"
         unit = ", unit unknown" if sensor == "mag" and recording.mag_unit == "arbitrary" else ""
-        rows.append((label, f"{sensor}  {there}{unit}"))
+        rows.append((label, f"{sensor.removesuffix('_acc')}  {there}{unit}"))
         label = ""
+    if recording.array is not None:
+        names = ", ".join(recording.array.names)
+        rows.append(("Array", f"{recording.array.name or 'unnamed'}, {len(recording.array)} accelerometers: {names}"))
+        rows.append(("", _worth(recording.array)))
     rows.append(("Frame", recording.frame))
     rows.append(("Reference", _reference(recording)))
     if recording.movement is not None:
         rows.append(("Movement", f"{_percent(float(recording.movement.mean()))} of the samples count for errors"))
     return rows
+
+
+def _worth(array: AccelerometerArray) -> str:
+    """Whether an array can stand in for a gyroscope."""
+    from northdown.arrays import analyse
+
+    try:
+        found = analyse(array)
+    except InputError as problem:
+        return f"no substitute for a gyroscope: {problem}"
+    return f"condition {found.condition:.3g}, angular noise {found.angular_dilution:.3g} rad/s² per m/s²"
 
 
 def describe_samples(recording: Recording) -> str:

@@ -15,6 +15,7 @@ import typer
 from northdown import __version__
 from northdown.cli import console
 from northdown.cli.allan import allan
+from northdown.cli.arrays import arrays
 from northdown.cli.calibrate import calibrate
 from northdown.cli.compare import compare
 from northdown.cli.consistency import consistency
@@ -93,6 +94,7 @@ _COMMANDS = (
     calibrate,
     allan,
     simulate,
+    arrays,
     demo,
 )
 for _command in _COMMANDS:

@@ -60,6 +60,10 @@ class Reading:
     calibration: Annotated[
         str | None, typer.Option(metavar="FILE", help="Correct the sensors first, with what 'calibrate' wrote.")
     ] = None
+    array: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Geometry (TOML) of the array of accelerometers, where REC has none."),
+    ] = None
     remap: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="New axes in terms of the old, such as y,-x,z.")
     ] = None
@@ -92,6 +96,7 @@ class Reading:
                 units=_units(self.unit) or None,
                 columns=_columns(self.columns) or None,
                 frame=self.frame,
+                array=self.array,
             )
         if self.align is not None:
             offset = cast("ReferenceOffset", check_choice("--align", self.align, _ALIGNMENTS))
@@ -207,13 +212,13 @@ def _units(texts: Iterable[str]) -> dict[str, str | float]:
         except ValueError:
             return text
 
-    known = ("time", "gyr", "acc", "mag")
+    known = ("array", "time", "gyr", "acc", "mag")
     return {key: read(unit) for key, unit in _pairs("--unit", texts, known, "gyr=deg/s").items()}
 
 
 def _columns(texts: Iterable[str]) -> dict[str, list[str | int]]:
     """Columns by quantity, by name or by number from 0; none leaves the quantity out."""
-    known = ("time", "gyr", "acc", "mag", "reference", "movement")
+    known = ("array", "time", "gyr", "acc", "mag", "reference", "movement")
     found: dict[str, list[str | int]] = {}
     for key, names in _pairs("--columns", texts, known, "gyr=a,b,c").items():
         parts = [name.strip() for name in names.split(",")] if names else []

@@ -7,16 +7,21 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from northdown.cli import console
+from northdown.cli.geometry import read_geometry
 from northdown.cli.numbers import read_count, read_number
 from northdown.cli.output import check_target
+from northdown.errors import InputError, expected
 from northdown.simulation.motion_library import MOTIONS
 from northdown.simulation.presets import PRESETS
 from northdown.simulation.writing import SUFFIXES
+
+if TYPE_CHECKING:
+    from northdown.simulation.imu_errors import SensorErrors
 
 # Eleven days at the highest rate would fill a large disk.
 _LONGEST = 1e6
@@ -42,6 +47,14 @@ def simulate(
     rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Sampling rate.")] = "100",
     seed: Annotated[str, typer.Option("--seed", metavar="N", help="Another seed, another recording.")] = "0",
     frame: Annotated[str, typer.Option("--frame", metavar="NED|ENU|NWU", help="Frame of the truth.")] = "NED",
+    array: Annotated[
+        str | None,
+        typer.Option("--array", metavar="NAME", help="Add an array of accelerometers: see 'arrays'; or its .toml."),
+    ] = None,
+    radius: Annotated[str | None, typer.Option("--radius", metavar="M", help="Of the named array.")] = None,
+    misplacement: Annotated[
+        str, typer.Option("--misplacement", metavar="M", help="Of the array's accelerometers, 1 sigma of each axis.")
+    ] = "0",
 ) -> None:
     """Write a recording of simulated sensors, with its truth."""
     from northdown._validation import check_choice
@@ -54,6 +67,7 @@ def simulate(
     samples_per_second = read_number("--rate", rate, low=1.0, high=_FASTEST, unit="Hz")
     number = read_count("--seed", seed)
     axes = check_frame(frame)
+    surroundings = _array(array, radius, misplacement, sensors.calibrated() if calibrated else sensors)
     if output != "-":
         check_target("--output", output, source="-", suffixes=SUFFIXES)
     name = f"simulated-{motion}-{preset}{'-calibrated' if calibrated else ''}-{number}"
@@ -68,13 +82,30 @@ def simulate(
             sensors=sensors.calibrated() if calibrated else sensors,
             name=name,
             progress=progress,
+            **surroundings,
         )
     if output != "-":
         rows = [
             ("Recording", f"{name}, {count} samples, {length:g} s at {samples_per_second:g} Hz, truth in {axes}"),
+            *([("Array", surroundings["array"].name or str(array))] if surroundings else []),
             ("Written", f"{output}, {os.path.getsize(Path(output)) / 1e6:.1f} MB"),
         ]
         console.facts(rows)
+
+
+def _array(array: str | None, radius: str | None, misplacement: str, sensors: SensorErrors) -> dict[str, Any]:
+    """An array of accelerometers like the preset's, for the simulation."""
+    if array is None:
+        if radius is not None or misplacement != "0":
+            raise InputError(expected("--array with --radius and --misplacement", "these alone"))
+        return {}
+    from northdown.simulation import ArrayErrors
+
+    own = read_geometry("--array", array, radius)
+    if sensors.acc is None:
+        raise InputError(expected("a --preset with an accelerometer for --array", "one without"))
+    shift = read_number("--misplacement", misplacement, low=0.0, unit="m")
+    return {"array": own, "array_errors": ArrayErrors.of(sensors.acc, misplacement=shift)}
 
 
 @contextlib.contextmanager

@@ -14,6 +14,10 @@ _REPLACED: Final[tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]] =
     (r", or an empty list to leave it out", ", or nothing after the = to leave it out"),
     (r"rate=(\S*?)( in Hz)? \(--rate on the command line\)", r"--rate \1\2"),
     (r"rate=(\d+) \((.*?)\), or --rate on the command line", r"--rate \1 (\2)"),
+    (
+        r"(give|\() ?array=…, (a geometry or its TOML file )?\(?(or )?--array on the command line\)",
+        r"\1 --array FILE.toml",
+    ),
     (r"rate=…", "--rate"),
     (r"frame=…", "--frame"),
     (r"max_gap", "--max-gap"),

@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from northdown._validation import FloatArray, check_number
+from northdown.arrays import AccelerometerArray
 from northdown.errors import FormatError, InputError, expected
+from northdown.io.array_columns import check_channels_live
 from northdown.io.columns import Columns, Plan, Units
 from northdown.io.layout import Meta, orientation_extras
 from northdown.io.source import MAX_BYTES, quoted
@@ -33,6 +35,7 @@ class Options:
     name: str = ""
     stem: str = ""
     max_bytes: int = MAX_BYTES
+    array: AccelerometerArray | None = None
 
     def named(self, stem: str) -> Options:
         """The same options, with the name that the file's own gives when nothing else does."""
@@ -74,6 +77,10 @@ def build_recording(
         if sensor in plan.places:
             array = np.column_stack([values[i].astype(np.float64) for i in plan.places[sensor]])
             fields[sensor] = array * factor(sensor, plan.units.get(sensor))
+    if plan.array is not None:
+        channels = np.column_stack([values[i].astype(np.float64) for i in plan.places["array"]])
+        check_channels_live(plan.array, channels)
+        fields |= {"array": plan.array, "array_acc": channels * factor("array", plan.units.get("array"))}
     frame = options.frame or meta.get("frame") or "NED"
     if "mag" in fields and (plan.units.get("mag") is not None or not meta):
         fields["mag_unit"] = "arbitrary" if is_arbitrary(plan.units.get("mag")) else "uT"

@@ -14,7 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from northdown.arrays import AccelerometerArray
 from northdown.errors import InputError, expected
+from northdown.io.array_columns import check_no_geometry, find_channels, unit_of_channels
 from northdown.io.source import quoted
 from northdown.io.units import QUANTITIES, factor, is_unit, split_bracket
 
@@ -58,11 +60,14 @@ class Plan:
         Unit of each, where one is given.
     counter : str
         Name of a column that counts rows, when there is one; empty otherwise.
+    array : AccelerometerArray or None
+        Geometry of the array whose channels are the places ``"array"``.
     """
 
     places: dict[str, tuple[int, ...]]
     units: dict[str, str | float] = field(default_factory=dict)
     counter: str = ""
+    array: AccelerometerArray | None = None
 
     @property
     def needed(self) -> list[int]:
@@ -77,6 +82,7 @@ def plan_columns(
     units: Units | None = None,
     groups: Mapping[str, Sequence[int]] | None = None,
     sensors: bool = True,
+    array: AccelerometerArray | None = None,
 ) -> Plan:
     """Find the columns of a recording among labels.
 
@@ -93,22 +99,28 @@ def plan_columns(
         Names of arrays whose columns belong together, with their indices.
     sensors : bool
         Whether at least one sensor must be found.
+    array : AccelerometerArray, optional
+        Geometry of the array whose channels are to be found, by its names or by ``columns["array"]``.
 
     Raises
     ------
     InputError
         When names are unknown or doubtful, an axis is missing, units differ between axes, or no sensor is found.
     """
+    columns = dict(columns or {})
+    channels = _channels(labels, array, columns.pop("array", None), sensors=sensors)
     found: dict[str, dict[str, list[tuple[int, int, str | None]]]] = {}
     counter = ""
     for index, label in enumerate(labels):
+        if index in channels:
+            continue
         match = _recognise(label)
         if match is not None:
             role, axis, extra, unit = match
             found.setdefault(role, {}).setdefault(axis, []).append((extra, index, unit))
         elif not counter and _COUNTER_WORDS & set(_words(split_bracket(label)[0])):
             counter = label.strip()
-    named = _named(labels, columns or {}, groups or {})
+    named = _named(labels, columns, groups or {})
     places: dict[str, tuple[int, ...]] = {}
     label_units: dict[str, str | float] = {}
     for role in SIZES:
@@ -126,8 +138,12 @@ def plan_columns(
         unit = kinds.pop()
         if unit is not None:
             label_units[role] = unit
-    plan = Plan(places, _override(label_units, units), counter)
-    if sensors and not {"gyr", "acc", "mag"} & set(places):
+    if channels:
+        places["array"] = channels
+        if (channel_unit := unit_of_channels([labels[i] for i in channels])) is not None:
+            label_units["array"] = channel_unit
+    plan = Plan(places, _override(label_units, units), counter, array)
+    if sensors and not {"gyr", "acc", "mag", "array"} & set(places):
         shown = ", ".join(quoted(s, 30) for s in list(groups or labels)[:8] if s) or "no header"
         do = "name them, as in columns={'gyr': ['wx', 'wy', 'wz']}"
         raise InputError(expected("columns of a gyroscope, an accelerometer or a magnetometer", shown, do=do))
@@ -190,6 +206,22 @@ def _unit_of(label: str, role: str) -> str | None:
     return unit if unit is not None and is_unit(role, unit) else None
 
 
+def _channels(
+    labels: Sequence[str],
+    array: AccelerometerArray | None,
+    given: str | int | Sequence[str | int] | None,
+    *,
+    sensors: bool,
+) -> tuple[int, ...]:
+    """Indices of an array's channels, by its names or as given; none without an array."""
+    if array is None:
+        if sensors and given is None:
+            check_no_geometry(labels)
+        return ()
+    listed = [given] if isinstance(given, (str, int)) else given
+    return find_channels(labels, array, None if listed is None else [_index(c, labels) for c in listed])
+
+
 def _pick(
     role: str, axes: dict[str, list[tuple[int, int, str | None]]], labels: Sequence[str]
 ) -> list[tuple[int, str | None]]:
@@ -218,7 +250,7 @@ def _named(labels: Sequence[str], columns: Columns, groups: Mapping[str, Sequenc
     result: dict[str, list[int]] = {}
     for role, value in columns.items():
         if role not in SIZES:
-            raise InputError(expected(f"columns of {', '.join(SIZES)}", quoted(role)))
+            raise InputError(expected(f"columns of {', '.join([*SIZES, 'array'])}", quoted(role)))
         names = [value] if isinstance(value, (str, int)) else list(value or ())
         if len(names) == 1 and isinstance(names[0], str) and names[0] in groups:
             result[role] = list(groups[names[0]])

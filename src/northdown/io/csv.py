@@ -12,12 +12,14 @@ import numpy.typing as npt
 
 from northdown.errors import FormatError, InputError, expected
 from northdown.io import repoimu
+from northdown.io.array_columns import PREFIX
 from northdown.io.assemble import Options, build_recording, seconds
 from northdown.io.columns import plan_columns
 from northdown.io.layout import (
     EXTRAS,
     KEYS,
     Meta,
+    array_of,
     check_kind,
     orientation_from_columns,
     orientation_meta,
@@ -42,7 +44,8 @@ def read_recording(source: Source, options: Options) -> Recording:
         if len(text.labels) == 8:
             do += "; a trajectory of time, position and quaternion is read by northdown.io.read_orientation"
         raise FormatError(expected("a header that names the columns", f"numbers only in {source.label}", do=do))
-    plan = plan_columns(text.labels, columns=options.columns, units=options.units)
+    array = array_of(meta, options.array, source.label)
+    plan = plan_columns(text.labels, columns=options.columns, units=options.units, array=array)
     extras = {f: text.labels.index(f"ref_{f}") for f in EXTRAS if meta and f"ref_{f}" in text.labels}
     times = plan.places.get("time", (None,))
     values = text.load(sorted({*plan.needed, *extras.values()}), time=times[0])
@@ -55,7 +58,7 @@ def write_recording(recording: Recording, file: BinaryIO) -> None:
     units = _UNITS | {"mag": "uT" if recording.mag_unit == "uT" else "a.u."}
     columns: dict[str, npt.NDArray[Any]] = {}
     for name, values in recording_columns(recording).items():
-        unit = units.get(name.partition("_")[0])
+        unit = units["acc"] if name.startswith(PREFIX) else units.get(name.partition("_")[0])
         columns[f"{name} ({unit})" if unit else name] = values
     _write(columns, recording_meta(recording), file)
 

@@ -19,7 +19,7 @@ from northdown.recording import Recording
 _MAX_DEPTH: Final = 4
 _MAX_OBJECTS: Final = 1000
 _MATLAB_TEXT: Final = (b"char", b"cell", b"struct", b"function_handle")
-_UNITS: Final = {"time": "s", "gyr": "rad/s", "acc": "m/s^2"}
+_UNITS: Final = {"time": "s", "gyr": "rad/s", "acc": "m/s^2", "array_acc": "m/s^2"}
 
 
 def read_recording(source: Source, options: Options) -> Recording:

@@ -5,7 +5,8 @@ reference ``ref_qw`` …, ``ref_cov_xx`` …, ``ref_gyr_bias_x`` …, ``ref_flag
 files (HDF5, MATLAB) have ``time``, ``gyr`` (N, 3) …, and ``reference_time``, ``reference_quat`` …
 
 What is not a number (frame, name …) is a few lines of text, here called meta: comment lines in CSV, otherwise one
-JSON object named ``northdown``.
+JSON object named ``northdown``. Of an array of accelerometers, tables have a column ``array_…`` for each, by its
+name, array files one array ``array_acc`` (N, K), and the meta the geometry as JSON (`northdown.io.array_file`).
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from northdown._validation import FloatArray
+from northdown.arrays import AccelerometerArray
 from northdown.errors import FormatError, InputError, expected
 from northdown.frames import FRAMES
+from northdown.io.array_columns import PREFIX, check_channels_live
+from northdown.io.array_file import array_from_json, array_json
 from northdown.io.source import quoted
 from northdown.orientation import Orientation
 from northdown.recording import SENSORS, Recording
@@ -27,9 +31,12 @@ from northdown.recording import SENSORS, Recording
 Meta = dict[str, str]
 Columns = dict[str, npt.NDArray[Any]]
 
-KEYS: Final = ("northdown", "frame", "name", "mag_unit", "reference_offset", "reference_frame", "reference_name")
+KEYS: Final = (
+    "northdown", "frame", "name", "mag_unit", "reference_offset", "reference_frame", "reference_name", "array"
+)  # fmt: skip
 """Keys of the metadata; ``northdown`` says what it is: ``"recording"`` or ``"orientation"``."""
 
+_MAX_META: Final = 1 << 18
 _VECTORS: Final = ("gyr_bias", "gyr_bias_sigma")
 _TRIU: Final = tuple((i, j, f"{'xyz'[i]}{'xyz'[j]}") for i, j in zip(*np.triu_indices(3), strict=True))
 
@@ -45,6 +52,8 @@ def recording_meta(recording: Recording) -> Meta:
     }
     if recording.reference is not None:
         meta |= {"reference_frame": recording.reference.frame, "reference_name": recording.reference.name}
+    if recording.array is not None:
+        meta["array"] = array_json(recording.array)
     return meta
 
 
@@ -69,12 +78,19 @@ def parse_meta(text: str | bytes | None, label: str) -> Meta:
     if text is None:
         return {}
     try:
-        meta = json.loads(text[:100_000])
+        meta = json.loads(text[:_MAX_META])
     except (ValueError, RecursionError):
         meta = None
     if not isinstance(meta, dict) or not all(isinstance(v, str) for v in meta.values()):
         raise FormatError(expected("northdown's metadata as JSON", f"other text in {label}"))
     return {key: meta[key] for key in KEYS if key in meta}
+
+
+def array_of(meta: Meta, given: AccelerometerArray | None, label: str) -> AccelerometerArray | None:
+    """Geometry of a file's array: the one given, else its own if it has one."""
+    if given is not None or "array" not in meta:
+        return given
+    return array_from_json(meta["array"], label)
 
 
 def check_kind(meta: Meta, kind: str, label: str) -> None:
@@ -101,6 +117,8 @@ def recording_columns(recording: Recording) -> Columns:
         value: FloatArray | None = getattr(recording, sensor)
         if value is not None:
             columns |= {f"{sensor}_{c}": value[:, i] for i, c in enumerate("xyz")}
+    if recording.array is not None and recording.array_acc is not None:
+        columns |= {f"{PREFIX}{n}": recording.array_acc[:, i] for i, n in enumerate(recording.array.names)}
     if recording.movement is not None:
         columns["movement"] = recording.movement.astype(np.uint8)
     reference = recording.reference
@@ -160,7 +178,7 @@ def recording_arrays(recording: Recording) -> Columns:
     """Named arrays of a recording, for files that hold several; the reference keeps its own times."""
     _check_not_empty(len(recording))
     arrays: Columns = {"time": recording.time}
-    for name in (*SENSORS, "movement"):
+    for name in (*SENSORS, "array_acc", "movement"):
         value = getattr(recording, name)
         if value is not None:
             arrays[name] = value
@@ -170,13 +188,24 @@ def recording_arrays(recording: Recording) -> Columns:
 
 
 def recording_from_arrays(
-    arrays: Mapping[str, npt.NDArray[Any]], meta: Meta, name: str, frame: str | None = None
+    arrays: Mapping[str, npt.NDArray[Any]],
+    meta: Meta,
+    name: str,
+    frame: str | None = None,
+    array: AccelerometerArray | None = None,
 ) -> Recording:
     """Recording from `recording_arrays` and `recording_meta`; shapes are checked by `Recording`."""
     fields: dict[str, Any] = {}
     for key in (*SENSORS, "movement"):
         if key in arrays:
             fields[key] = arrays[key].ravel() if key == "movement" else arrays[key]
+    if array is not None and "array_acc" in arrays:
+        channels = arrays["array_acc"]
+        if channels.ndim != 2 or channels.shape[1] != len(array):
+            what = f"array_acc with {len(array)} columns, one for each of {', '.join(array.names)}"
+            raise FormatError(expected(what, f"shape {channels.shape}"))
+        check_channels_live(array, channels.astype(np.float64))
+        fields |= {"array": array, "array_acc": channels}
     if "time" not in arrays:
         raise FormatError(expected("an array named time", "none"))
     time = arrays["time"].ravel()

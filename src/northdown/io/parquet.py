@@ -16,6 +16,7 @@ from northdown.io.layout import (
     EXTRAS,
     Columns,
     Meta,
+    array_of,
     check_kind,
     meta_json,
     orientation_from_columns,
@@ -37,7 +38,8 @@ def read_recording(source: Source, options: Options) -> Recording:
     with _open(source) as file:
         labels, meta = _describe(file, source)
         check_kind(meta, "recording", source.label)
-        plan = plan_columns(labels, columns=options.columns, units=_time_unit(file, options))
+        array = array_of(meta, options.array, source.label)
+        plan = plan_columns(labels, columns=options.columns, units=_time_unit(file, options), array=array)
         extras = {f: labels.index(f"ref_{f}") for f in EXTRAS if meta and f"ref_{f}" in labels}
         values = _load(file, labels, [*plan.needed, *extras.values()], options.max_bytes, source)
     return build_recording(plan, values, options, meta, {f: values[i] for f, i in extras.items()})

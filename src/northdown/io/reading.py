@@ -9,8 +9,10 @@ from typing import IO
 import numpy as np
 
 from northdown._validation import check_choice, check_number
+from northdown.arrays import AccelerometerArray
 from northdown.errors import FormatError, expected
 from northdown.frames import check_frame
+from northdown.io.array_file import read_array
 from northdown.io.assemble import Options
 from northdown.io.columns import Columns, Units
 from northdown.io.source import FORMATS, MAX_BYTES, Source, open_source, recognise
@@ -27,6 +29,7 @@ def read(
     columns: Columns | None = None,
     frame: str | None = None,
     name: str | None = None,
+    array: AccelerometerArray | str | os.PathLike[str] | None = None,
     max_bytes: int = MAX_BYTES,
 ) -> Recording:
     """Read a recording from a file, in SI units.
@@ -49,12 +52,17 @@ def read(
     columns : mapping, optional
         Columns by name or number (from 0) where the header does not tell:
         ``{"time": "t", "gyr": ["p", "q", "r"], "reference": ["qw", "qx", "qy", "qz"]}``; also ``acc``, ``mag``,
-        ``movement``. An empty list leaves a quantity out.
+        ``movement``. An empty list leaves a quantity out. ``array`` names the channels of an array of accelerometers,
+        in the order of its geometry.
     frame : {"NED", "ENU", "NWU"}, optional
         Frame in which results are wanted and the file's reference is. A file that northdown wrote knows its own: its
         reference is then converted.
     name : str, optional
         Name of the recording. When not given, the one in the file, or the file's name without suffix.
+    array : AccelerometerArray, str or os.PathLike, optional
+        Geometry of the array of accelerometers whose channels the file holds, or a TOML file with it (see
+        `read_array`). Its channels are the columns with the accelerometers' names, or these after ``array_``. A file
+        that northdown wrote knows its own.
     max_bytes : int
         Limit for the size of the file, and of what it unpacks to; 2 GiB unless raised.
 
@@ -93,6 +101,7 @@ def read(
         None if frame is None else check_frame(frame),
         name or "",
         max_bytes=max_bytes,
+        array=array if array is None or isinstance(array, AccelerometerArray) else read_array(array),
     )
     source = open_source(path, max_bytes)
     options = options.named(source.stem)

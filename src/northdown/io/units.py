@@ -5,6 +5,7 @@ quantity units (upper or lower case; superscripts, ``^`` and spaces as you like)
 ======== ===============================================================================================
 gyr      rad/s, mrad/s, deg/s (dps, °/s), mdps
 acc      m/s², g, mg, with g = 9.80665 m/s²
+array    as acc
 mag      uT (µT), nT, mT, T, G (gauss), mG, a.u. (size without known unit: only its direction counts)
 time     s, ms, us, ns
 ======== ===============================================================================================
@@ -23,7 +24,7 @@ STANDARD_GRAVITY: Final = 9.80665
 """m/s² in one g (CGPM 1901)."""
 
 ARBITRARY: Final = "a.u."
-QUANTITIES: Final = ("time", "gyr", "acc", "mag")
+QUANTITIES: Final = ("time", "gyr", "acc", "mag", "array")
 
 _DEG: Final = math.pi / 180.0
 # Factor to SI (µT for the field) and spellings, after `_plain`.
@@ -59,12 +60,14 @@ _FACTORS: Final[dict[str, dict[str, float]]] = {
     quantity: {word: factor for factor, words in rows for word in words.split()}
     for quantity, rows in _SPELLINGS.items()
 }
+_FACTORS["array"] = _FACTORS["acc"]  # its channels are accelerometers
 _ARBITRARY: Final = frozenset(_SPELLINGS["mag"][-1][1].split())
 _SHOWN: Final = {
     "gyr": "rad/s, deg/s, dps, mdps",
     "acc": "m/s², g, mg",
     "mag": "uT, nT, mT, T, G, mG, a.u.",
     "time": "s, ms, us, ns",
+    "array": "m/s², g, mg",
 }
 _REPLACED: Final = str.maketrans(
     {
@@ -90,7 +93,7 @@ def _plain(unit: str) -> str:
 
 
 def is_unit(quantity: str, unit: str) -> bool:
-    """Whether a text is a unit of ``"gyr"``, ``"acc"``, ``"mag"`` or ``"time"``."""
+    """Whether a text is a unit of ``"gyr"``, ``"acc"``, ``"mag"``, ``"time"`` or ``"array"``."""
     return _plain(unit) in _FACTORS[quantity]
 
 
@@ -104,7 +107,7 @@ def factor(quantity: str, unit: str | float | None) -> float:
 
     Parameters
     ----------
-    quantity : {"gyr", "acc", "mag", "time"}
+    quantity : {"gyr", "acc", "mag", "time", "array"}
         What is measured.
     unit : str, float or None
         A unit of the table above; a number is the factor itself, for raw counts; None means SI already.

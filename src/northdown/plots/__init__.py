@@ -5,6 +5,7 @@ notebook by naming it, or write it with `save`. Angles in degrees unless asked o
 """
 
 from northdown.plots._allan import allan
+from northdown.plots._array import array
 from northdown.plots._consistency import consistency
 from northdown.plots._errors import errors
 from northdown.plots._euler import euler
@@ -14,4 +15,15 @@ from northdown.plots._quaternion import quaternion
 from northdown.plots._save import save
 from northdown.plots._sensors import sensors
 
-__all__ = ["allan", "consistency", "errors", "euler", "observability", "path", "quaternion", "save", "sensors"]
+__all__ = [
+    "allan",
+    "array",
+    "consistency",
+    "errors",
+    "euler",
+    "observability",
+    "path",
+    "quaternion",
+    "save",
+    "sensors",
+]

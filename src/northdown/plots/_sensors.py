@@ -33,7 +33,7 @@ _GREY = "0.45"
 
 
 def sensors(recording: Recording) -> Figure:
-    """Draw gyroscope, accelerometer and magnetometer over time, with the sizes of the latter two.
+    """Draw gyroscope, accelerometer and magnetometer over time, with the sizes of the latter two, and an array.
 
     Parameters
     ----------
@@ -43,8 +43,9 @@ def sensors(recording: Recording) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        A panel for each sensor there is (°/s, m/s², µT), and one each for the size of acceleration and field. Grey:
-        not `movement`; hatched: no samples for longer than three of the sensor's own periods.
+        A panel for each sensor there is (°/s, m/s², µT), and one each for the size of acceleration and field; one
+        for all accelerometers of an array, whose lines are not told apart. Grey: not `movement`; hatched: no samples
+        for longer than three of the sensor's own periods.
 
     Raises
     ------
@@ -93,6 +94,8 @@ def _panels(recording: Recording) -> list[tuple[str, FloatArray, float]]:
         panels.append((f"{sensor}\n({unit[sensor]})", shown, 1.2))
         if sensor != "gyr" and not np.isnan(value).any(axis=1).all():
             panels.append((f"|{sensor}|\n({unit[sensor]})", np.linalg.norm(value, axis=1)[:, None], 0.8))
+    if recording.array_acc is not None:
+        panels.append(("array\n(m/s²)", recording.array_acc, 1.2))
     return panels
 
 
@@ -107,7 +110,7 @@ def _draw_sensor(ax: Axes, clock: Clock, time: FloatArray, value: FloatArray) ->
     steps = np.diff(seen)
     gap = 3.0 * float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     for i in range(value.shape[1]):
-        color, style = STYLES[i] if value.shape[1] > 1 else (_GREY, "-")
+        color, style = STYLES[i] if value.shape[1] == 3 else (_GREY, "-")
         column = np.where(there, value[:, i], np.nan)
         draw(ax, clock, time, column, gap=gap, color=color, linestyle=style, linewidth=0.8, alpha=0.85)
     return _shade_missing(ax, clock, time, seen, gap)

@@ -12,6 +12,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from northdown.simulation.array import simulate_array
+    from northdown.simulation.array_errors import ArrayErrors
     from northdown.simulation.datasheet import accelerometer, gyroscope, magnetometer
     from northdown.simulation.dipole import Dipole
     from northdown.simulation.imu import measure, measure_chunks
@@ -63,6 +65,7 @@ __all__ = [
     "MPU_9250",
     "PRESETS",
     "AboutAxis",
+    "ArrayErrors",
     "Coning",
     "Dipole",
     "Fixed",
@@ -90,6 +93,7 @@ __all__ = [
     "replay",
     "rest",
     "simulate",
+    "simulate_array",
     "simulate_to_file",
     "sines",
     "steady",
@@ -101,6 +105,8 @@ __all__ = [
 ]
 
 _HOMES = {
+    "array": ("simulate_array",),
+    "array_errors": ("ArrayErrors",),
     "datasheet": ("accelerometer", "gyroscope", "magnetometer"),
     "dipole": ("Dipole",),
     "imu": ("measure", "measure_chunks"),

@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from northdown._validation import FloatArray, check_number
+from northdown.arrays import AccelerometerArray
 from northdown.errors import InputError, expected
 from northdown.frames import check_frame
 from northdown.orientation import Orientation
 from northdown.recording import Recording
 from northdown.simulation import _quaternions as quaternions
+from northdown.simulation.array_errors import ArrayErrors
 from northdown.simulation.dipole import Dipole
 from northdown.simulation.imu_bench import Bench
 from northdown.simulation.imu_errors import SensorErrors
@@ -34,6 +36,8 @@ def measure(
     disturbances: Sequence[Dipole] = (),
     frame: str = "NED",
     name: str | None = None,
+    array: AccelerometerArray | None = None,
+    array_errors: ArrayErrors | None = None,
 ) -> Recording:
     """Let sensors measure a motion.
 
@@ -62,6 +66,10 @@ def measure(
         Frame in which the recording states its truth.
     name : str, optional
         Name of the recording; the motion's when not given.
+    array : AccelerometerArray, optional
+        Accelerometers beside the other sensors, placed from the body's origin; see `simulate_array`.
+    array_errors : ArrayErrors, optional
+        What these add to the truth; nothing when not given.
 
     Returns
     -------
@@ -74,9 +82,11 @@ def measure(
     A sample of the gyroscope is the mean rate since the sample before, log(R_{k−1}ᵀ R_k)/Δt, so that the exact
     integration of error-free samples gives back the truth.
     """
-    parts = list(_parts(motion, errors, seed, rate, time, field, gravity, position, disturbances))
+    unit = _array_of(array, array_errors)
+    parts = list(_parts(motion, errors, seed, rate, time, field, gravity, position, disturbances, unit))
     joined = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
-    return _recording(joined, check_frame(frame), name or motion.name, keep_movement=bool(joined["movement"].any()))
+    moves = bool(joined["movement"].any())
+    return _recording(joined, check_frame(frame), name or motion.name, array, keep_movement=moves)
 
 
 def measure_chunks(
@@ -93,6 +103,8 @@ def measure_chunks(
     disturbances: Sequence[Dipole] = (),
     frame: str = "NED",
     name: str | None = None,
+    array: AccelerometerArray | None = None,
+    array_errors: ArrayErrors | None = None,
 ) -> Iterator[Recording]:
     """Let sensors measure a motion of any length in little memory.
 
@@ -100,7 +112,7 @@ def measure_chunks(
     ----------
     chunk : int
         Samples in each of the recordings, of which the last may be shorter.
-    motion, errors, seed, rate, time, field, gravity, position, disturbances, frame, name
+    motion, errors, seed, rate, time, field, gravity, position, disturbances, frame, name, array, array_errors
         See `measure`.
 
     Yields
@@ -113,7 +125,8 @@ def measure_chunks(
     check_frame(frame)
     waiting: list[dict[str, npt.NDArray[Any]]] = []
     count = 0
-    for part in _parts(motion, errors, seed, rate, time, field, gravity, position, disturbances):
+    unit = _array_of(array, array_errors)
+    for part in _parts(motion, errors, seed, rate, time, field, gravity, position, disturbances, unit):
         waiting.append(part)
         count += len(part["time"])
         if count < chunk:
@@ -122,12 +135,12 @@ def measure_chunks(
         done = count - count % chunk
         for first in range(0, done, chunk):
             some = {k: v[first : first + chunk] for k, v in joined.items()}
-            yield _recording(some, check_frame(frame), name or motion.name, keep_movement=True)
+            yield _recording(some, check_frame(frame), name or motion.name, array, keep_movement=True)
         waiting = [{k: v[done:] for k, v in joined.items()}]
         count -= done
     if count:
         joined = {k: np.concatenate([p[k] for p in waiting]) for k in waiting[0]}
-        yield _recording(joined, check_frame(frame), name or motion.name, keep_movement=True)
+        yield _recording(joined, check_frame(frame), name or motion.name, array, keep_movement=True)
 
 
 def _parts(
@@ -140,6 +153,7 @@ def _parts(
     gravity: float,
     position: npt.ArrayLike,
     disturbances: Sequence[Dipole],
+    array: tuple[AccelerometerArray, ArrayErrors] | None,
 ) -> Iterator[dict[str, npt.NDArray[Any]]]:
     if not isinstance(motion, Motion):
         raise InputError(expected("a Motion", type(motion).__name__))
@@ -157,11 +171,34 @@ def _parts(
         gravity=check_number("gravity", gravity, low=0.0, unit="m/s²"),
         position=vector("position", position),
         disturbances=tuple(disturbances),
+        array=array,
     )
     yield from bench.blocks()
 
 
-def _recording(part: dict[str, npt.NDArray[Any]], frame: Any, name: str, *, keep_movement: bool) -> Recording:
+def _array_of(
+    array: AccelerometerArray | None, errors: ArrayErrors | None
+) -> tuple[AccelerometerArray, ArrayErrors] | None:
+    """Array with its errors, checked."""
+    if array is None:
+        if errors is not None:
+            raise InputError(expected("array with array_errors", "array_errors alone"))
+        return None
+    if not isinstance(array, AccelerometerArray):
+        raise InputError(expected("an AccelerometerArray", type(array).__name__))
+    if errors is not None and not isinstance(errors, ArrayErrors):
+        raise InputError(expected("ArrayErrors", type(errors).__name__, do="make them with ArrayErrors.of"))
+    return array, ArrayErrors() if errors is None else errors
+
+
+def _recording(
+    part: dict[str, npt.NDArray[Any]],
+    frame: Any,
+    name: str,
+    array: AccelerometerArray | None,
+    *,
+    keep_movement: bool,
+) -> Recording:
     quat: FloatArray = np.ascontiguousarray(quaternions.normalize(part["quat"].T).T)
     truth = Orientation(part["time"], quat, "NED", gyr_bias=part.get("gyr_bias"), name="truth").to_frame(frame)
     return Recording(
@@ -173,4 +210,6 @@ def _recording(part: dict[str, npt.NDArray[Any]], frame: Any, name: str, *, keep
         movement=part["movement"] if keep_movement else None,
         frame=frame,
         name=name,
+        array=array,
+        array_acc=part.get("array_acc"),
     )

@@ -9,7 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from northdown._validation import FloatArray
+from northdown.arrays import AccelerometerArray
 from northdown.simulation import _quaternions as quaternions
+from northdown.simulation.array_errors import ArrayErrors
+from northdown.simulation.array_unit import ArrayUnit
 from northdown.simulation.dipole import Dipole
 from northdown.simulation.imu_clock import BLOCK, Clock, Timing
 from northdown.simulation.imu_errors import SensorErrors, TriadErrors
@@ -41,6 +44,7 @@ class Bench:
         gravity: float,
         position: FloatArray,
         disturbances: tuple[Dipole, ...],
+        array: tuple[AccelerometerArray, ArrayErrors] | None = None,
     ) -> None:
         self._motion, self._errors = motion, errors
         self._field, self._position, self._disturbances = field[:, None], position, disturbances
@@ -66,9 +70,14 @@ class Bench:
                     sensor=sensor,
                 )
             self._channels.append(channel)
+        self._array: ArrayUnit | None = None
+        if array is not None:
+            self._array = ArrayUnit(
+                *array, self._state, period=self._clock.period, start=self._clock.start, seed=seed
+            )
 
     def blocks(self) -> Iterator[Block]:
-        """Arrays time, quat and movement of each block; gyr, gyr_bias, acc and mag of the sensors there are."""
+        """Arrays time, quat and movement of each block; gyr, gyr_bias, acc, mag, array_acc where there is such."""
         before: float | None = None
         for first in range(0, self._clock.count, BLOCK):
             instants, stamps, lost = self._timing.block(first, min(first + BLOCK, self._clock.count))
@@ -85,6 +94,8 @@ class Bench:
                 else:
                     own: TriadErrors = getattr(self._errors, key)
                     block[key] = self._read(channel, own, edges, first == 0)
+            if self._array is not None:
+                block["array_acc"] = self._array.read(edges[1:])
             block["movement"] = self._moves(edges)
             block["quat"] = self._quat(stamps).T
             before = float(instants[-1])
@@ -139,13 +150,20 @@ class Bench:
         return self._force(time - delay if delay else time)
 
     def _force(self, time: FloatArray) -> FloatArray:
-        free = self._motion.path.acceleration(self._inside(time)) - self._gravity
         if not self._position.any():
+            free = self._motion.path.acceleration(self._inside(time)) - self._gravity
             return np.ascontiguousarray(quaternions.rotate_inverse(self._quat(time), free).T)
-        quat, rate, acceleration = self._motion.turning.evaluate(self._inside(time))
+        rate, acceleration, force = self._state(time)
         arm = self._position[:, None] + np.zeros_like(rate)
         turning = quaternions.cross(acceleration, arm) + quaternions.cross(rate, quaternions.cross(rate, arm))
-        return np.ascontiguousarray((quaternions.rotate_inverse(quat, free) + turning).T)
+        return np.ascontiguousarray((force + turning).T)
+
+    def _state(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Body rate, its derivative, and specific force at the body's origin, (3, N) in body axes."""
+        inside = self._inside(time)
+        free = self._motion.path.acceleration(inside) - self._gravity
+        quat, rate, acceleration = self._motion.turning.evaluate(inside)
+        return rate, acceleration, quaternions.rotate_inverse(quat, free)
 
     def _magnetic(self, time: FloatArray) -> FloatArray:
         delay = self._errors.mag.delay if self._errors.mag is not None else 0.0

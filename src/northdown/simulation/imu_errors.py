@@ -49,7 +49,8 @@ def _check_correlation(times: tuple[float, float]) -> None:
         raise InputError(expected("two increasing correlation times (s)", f"{times}"))
 
 
-def _check_burst(name: str, part: float, length: float) -> None:
+def check_burst(name: str, part: float, length: float) -> None:
+    """Check the part of samples that are missing, and the mean length of the gaps."""
     if check_number(name, part, low=0.0) >= 1.0:
         raise InputError(expected(f"{name} of less than 1", f"{part:g}"))
     check_number(f"{name}_length", length, low=1.0)
@@ -142,7 +143,7 @@ class TriadErrors:
             check_number("rate", self.rate, above=0.0, unit="Hz")
         if self.correlation is not None:
             _check_correlation(self.correlation)
-        _check_burst("dropout", self.dropout, self.dropout_length)
+        check_burst("dropout", self.dropout, self.dropout_length)
 
     @property
     def coefficients(self) -> FloatArray:
@@ -215,7 +216,7 @@ class SensorErrors:
             raise InputError(expected("a gyroscope at the recording's rate", f"{self.gyr.rate:g} Hz of its own"))
         check_number("jitter", self.jitter, low=0.0, unit="s")
         check_number("stamp_noise", self.stamp_noise, low=0.0, unit="s")
-        _check_burst("loss", self.loss, self.loss_length)
+        check_burst("loss", self.loss, self.loss_length)
 
     def calibrated(self, remaining: float = 0.02) -> SensorErrors:
         """The same sensors after calibration: constant errors are `remaining` of what they were."""

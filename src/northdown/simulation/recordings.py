@@ -47,7 +47,7 @@ def simulate(
     name : str, optional
         Name of the recording.
     **surroundings
-        ``field``, ``gravity``, ``position`` and ``disturbances`` of `measure`.
+        ``field``, ``gravity``, ``position``, ``disturbances``, ``array`` and ``array_errors`` of `measure`.
 
     Returns
     -------

@@ -91,7 +91,7 @@ def join(chunks: Iterable[Recording]) -> Recording:
     if not parts:
         raise InputError(expected("at least one part of a recording", "none"))
     arrays: dict[str, Any] = {"time": np.concatenate([p.time for p in parts])}
-    for key in ("gyr", "acc", "mag", "movement"):
+    for key in ("gyr", "acc", "mag", "array_acc", "movement"):
         if getattr(parts[0], key) is not None:
             arrays[key] = np.concatenate([getattr(p, key) for p in parts])
     references = [p.reference for p in parts if p.reference is not None]
@@ -143,7 +143,7 @@ def _hdf5(chunks: Iterator[Recording], file: BinaryIO) -> None:
 
     h5py = import_optional("h5py", "io")
     first = next(chunks)
-    units = {"time": "s", "gyr": "rad/s", "acc": "m/s^2", "reference_time": "s"}
+    units = {"time": "s", "gyr": "rad/s", "acc": "m/s^2", "array_acc": "m/s^2", "reference_time": "s"}
     units["mag"] = "uT" if first.mag_unit == "uT" else "a.u."
     with h5py.File(file, "w") as target:
         for name, values in recording_arrays(first).items():
