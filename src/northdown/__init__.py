@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from northdown.estimators.quaternion_ekf import QuaternionEKF
     from northdown.estimators.tilt_compass import TiltCompass
     from northdown.estimators.triad import Triad
+    from northdown.estimators.vqf import VQF
     from northdown.evaluation import align, attitude_error, observability
     from northdown.io import read, read_array, read_orientation, write_array, write_orientation, write_recording
     from northdown.navigation import Trajectory, navigate
@@ -71,6 +72,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "MEKF",
+    "VQF",
     "AccelerometerArray",
     "Complementary",
     "CrossProduct",

@@ -43,7 +43,7 @@ class Flag(enum.IntFlag):
     LONG_STEP = 8
     """More time than the maximum gap has passed since the last sample."""
     MAG_REJECTED = 16
-    """The field departed so far from its reference that the sample was given less than 1 % of its weight."""
+    """The field was found disturbed. Of a Kalman filter: the sample was given less than 1 % of its weight."""
     NEAR_SINGULAR = 32
     """The attitude is near one in which the method's angles are undefined; do not trust it."""
     ACC_REJECTED = 64

@@ -160,35 +160,29 @@ class Stream:
 
         Its times must follow on from those already taken. Results are those of the uninterrupted run.
         """
-        estimator, kernel = self.estimator, self.estimator.kernel
-        n = len(recording)
-        absent = [s for s in estimator.needs if getattr(recording, s) is None]
-        if absent:
-            raise InputError(
-                expected(f"{' and '.join(estimator.needs)} for {estimator.name}", f"no {' and no '.join(absent)}")
-            )
-        sensors = [getattr(recording, s) for s in ("gyr", "acc", "mag")]
-        if any(s is None for s in sensors):
-            nothing = np.zeros((n, 3)) if recording.gyr is None else np.full((n, 3), np.nan)
-            if recording.gyr is None:
-                sensors[0], nothing = nothing, np.full((n, 3), np.nan)
-            sensors = [nothing if s is None else s for s in sensors]
-        out = np.empty((n, kernel.n_out))
-        flags = np.zeros(n, np.uint8)
-        work = self._work
-        code, done = kernel.run(work.params, work.state, work.turn, recording.time, *sensors, out, flags)
-        if code:
-            self._raise(code, recording.time[done] if done < n else math.nan, done)
-        if n:
+        out, flags = self._record(recording)
+        if len(flags):
             self.flags = int(flags[-1])
         return Orientation._trusted(
             time=recording.time,
             quat=out[:, :4],
             frame=self.frame,
             flags=flags,
-            name=estimator.name,
-            **_outputs(estimator.outputs, out),
+            name=self.estimator.name,
+            **outputs(self.estimator.outputs, out),
         )
+
+    def _record(self, recording: Recording) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
+        """All that the kernel records over a recording, (N, n_out), and the flags."""
+        kernel, n = self.estimator.kernel, len(recording)
+        sensors = three_sensors(self.estimator, recording)
+        out = np.empty((n, kernel.n_out))
+        flags = np.zeros(n, np.uint8)
+        work = self._work
+        code, done = kernel.run(work.params, work.state, work.turn, recording.time, *sensors, out, flags)
+        if code:
+            self._raise(code, recording.time[done] if done < n else math.nan, done)
+        return out, flags
 
     def _raise(self, code: int, time: float, at: int) -> typing.NoReturn:
         if code == NO_TIME:
@@ -222,7 +216,26 @@ class Stream:
         )
 
 
-def _outputs(where: Mapping[str, slice], out: FloatArray) -> dict[str, Any]:
+def three_sensors(estimator: Estimator, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """gyr, acc and mag, (N, 3) each, of a recording that has what the estimator needs.
+
+    A sensor that is not there has NaN; a gyroscope that is not there measures no rate.
+    """
+    absent = [s for s in estimator.needs if getattr(recording, s) is None]
+    if absent:
+        raise InputError(
+            expected(f"{' and '.join(estimator.needs)} for {estimator.name}", f"no {' and no '.join(absent)}")
+        )
+    shape = (len(recording), 3)
+    nothing = np.full(shape, np.nan) if recording.acc is None or recording.mag is None else np.empty((0, 3))
+    return (
+        np.zeros(shape) if recording.gyr is None else recording.gyr,
+        nothing if recording.acc is None else recording.acc,
+        nothing if recording.mag is None else recording.mag,
+    )
+
+
+def outputs(where: Mapping[str, slice], out: FloatArray) -> dict[str, Any]:
     """Fields of the `Orientation` from what the kernel recorded after the quaternion."""
     fields: dict[str, Any] = {}
     for key, columns in where.items():

@@ -56,6 +56,8 @@ class Estimator(abc.ABC):
     outputs: ClassVar[Mapping[str, slice]] = types.MappingProxyType({})
     """Where `gyr_bias`, its sigma and the `covariance` (nine entries by rows) stand in what the kernel records;
     other names, of one column each, become `Orientation.diagnostics`."""
+    smooths: ClassVar[bool] = False
+    """Whether `smooth` can be called."""
     singular: ClassVar[str] = ""
     """Attitudes in which the method fails, in words; empty for none."""
 
@@ -120,6 +122,33 @@ class Estimator(abc.ABC):
         """
         stream = self.stream(frame=frame or recording.frame, initial=initial, max_gap=max_gap)
         return stream.run(recording)
+
+    def smooth(self, recording: Recording, *, frame: str | None = None) -> Orientation:
+        """Estimate the orientation from the whole recording, at each time from its past and its future.
+
+        More accurate than `run`, and only for recordings; estimators whose `smooths` is true can do it.
+
+        Parameters
+        ----------
+        recording : Recording
+            Sensor data. Rows of NaN in acc and mag are samples that were not taken.
+        frame : {"NED", "ENU", "NWU"}, optional
+            Navigation frame of the result; the recording's own when not given.
+
+        Returns
+        -------
+        Orientation
+            Attitude at every time of the recording.
+
+        Raises
+        ------
+        InputError
+            When the estimator cannot smooth, and as for `run`.
+        """
+        from northdown.estimators._registry import registry
+
+        able = ", ".join(name for name, estimator in registry().items() if estimator.smooths)
+        raise InputError(expected(f"an estimator that smooths ({able})", self.name, do="use run"))
 
     def stream(
         self,

@@ -19,11 +19,11 @@ from typing import Any, Final, NamedTuple
 import numba
 import numpy as np
 import numpy.typing as npt
-from numba.np.unsafe.ndarray import to_fixed_tuple as _to_fixed_tuple
 
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.numpy_abi import IN_PLACE, THROUGH_NUMBA, Reading, layout_holds
 from northdown.kernels.quaternion import congruent, dot, down_b, multiply, whole_axes
+from northdown.kernels.tuples import put_tuple, to_fixed_tuple
 from northdown.kernels.wahba import has_heading, heading_error, tilt_correction, turn_about_down
 
 # The runner's own entries at the head of the state array.
@@ -54,9 +54,6 @@ NO_VECTOR: Final = 4
 NO_TIME: Final = 5
 
 _NAN: Final = math.nan
-
-# numba turns it into the tuple of an array's first entries; for the type checker it is anything.
-to_fixed_tuple: Any = _to_fixed_tuple
 
 Array = npt.NDArray[np.float64]
 Step = Callable[..., tuple[float, ...]]
@@ -140,7 +137,7 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
                 s = aligned(p, s, q, pending == 0.0)
                 if memoryless:
                     s = step(p, s, 0.0, gyr, acc, mag)
-            flags |= int(pending)
+            flags |= int(pending) if pending > 0.0 else flagged(p, s)
         return code, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
 
     return tick
@@ -215,8 +212,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
                 if not is_attitude(out[i, 0], out[i, 1], out[i, 2], out[i, 3]):
                     done = i
                     break
-        for j in range(n_state):
-            state[N_RUNNER + j] = s[j]
+        put_tuple(state[N_RUNNER:], s)
         for j in range(5):
             state[j] = r[j]
         state[LAST] = last
@@ -272,8 +268,7 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
             out[j] = q[j]
         for j in range(4, n_out):
             out[j] = o[j]
-        for j in range(n_state):
-            state[N_RUNNER + j] = s[j]
+        put_tuple(state[N_RUNNER:], s)
         for j in range(5):
             state[j] = r[j]
         state[LAST] = time

@@ -26,18 +26,23 @@ _PARALLEL = 1e-6
 
 
 @inline
+def arc_to_up(u: Vector) -> Quaternion:
+    """Shortest arc in NED from the unit vector u to up; about x where u points down."""
+    # from u to up = (0, 0, −1): (1 + u·up, u × up)
+    c = 1.0 - u[2]
+    if c < 1e-12:
+        return (0.0, 1.0, 0.0, 0.0)
+    return normalize((c, -u[1], u[0], 0.0))
+
+
+@inline
 def tilt_correction(q: Quaternion, acc_b: Vector) -> Quaternion:
     """Rotation in NED that brings specific force to point straight up, with q the present attitude.
 
     The shortest arc: its axis is horizontal, so the heading of the down axis' plane is left alone. For specific
     force that points exactly down the axis is x.
     """
-    u = unit(rotate(q, acc_b))
-    # shortest arc from u to up = (0, 0, −1): (1 + u·up, u × up)
-    c = 1.0 - u[2]
-    if c < 1e-12:
-        return (0.0, 1.0, 0.0, 0.0)
-    return normalize((c, -u[1], u[0], 0.0))
+    return arc_to_up(unit(rotate(q, acc_b)))
 
 
 @inline
