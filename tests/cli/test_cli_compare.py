@@ -113,3 +113,10 @@ def test_plot(run, csv, recording, tmp_path):
     bare = tmp_path / "bare.csv"
     nd.write_recording(dataclasses.replace(recording, reference=None), bare)
     assert run("compare", bare, "--plot", tmp_path / "angles.png").code == 0
+
+
+def test_offline_adds_those_that_smooth(run, csv):
+    result = run("compare", csv, "-e", "vqf,mahony", "--offline", "--json")
+    assert result.code == 0
+    names = [e["name"] for e in json.loads(result.out)["estimators"]]
+    assert sorted(names) == ["mahony", "vqf", "vqf (offline)"]

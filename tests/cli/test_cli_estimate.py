@@ -157,3 +157,28 @@ def test_standard_input(csv, recording):
         nd.estimators.get(DEFAULT_ESTIMATOR)().run(recording).quat,
     )
     assert result.stderr.decode().startswith("Recording   walk, 601 samples")
+
+
+def test_offline_is_smoothing(run, recording, csv, tmp_path):
+    out = tmp_path / "o.csv"
+    result = run("estimate", csv, "-e", "vqf", "--offline", "-o", out)
+    assert (result.code, result.err) == (0, "")
+    assert "vqf (defaults), offline" in result.out
+    found = table(out.read_text())
+    expected = nd.VQF().smooth(recording)
+    # the file of the recording holds text of so many digits
+    np.testing.assert_allclose(found[["qw", "qx", "qy", "qz"]].to_numpy(), expected.quat, atol=1e-6)
+    assert np.abs(expected.quat - nd.VQF().run(recording).quat).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("-e", "mahony"), "expected an estimator that smooths for --offline, got mahony; choose "),
+        (("-e", "vqf", "--max-gap", "0.5"), "expected either --offline or --max-gap, got both"),
+    ],
+)
+def test_offline_mistakes(run, csv, arguments, message):
+    result = run("estimate", csv, "--offline", *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err

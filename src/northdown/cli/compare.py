@@ -26,6 +26,9 @@ def compare(
             "--estimator", "-e", metavar="A,B,…", help="Estimators; all that the sensors allow when not given."
         ),
     ] = [],  # noqa: B006  (typer copies it)
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Also the estimators that can use the whole recording for each sample.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Write JSON instead of a table.")] = False,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="FILE", help="Draw the first six: .png, .svg or .pdf.")
@@ -49,7 +52,7 @@ def compare(
     else:
         wanted, left_out = all_for(recording)
     gate.admit(recording, wanted, max_gap=longest, force=force)
-    runs = run_all(recording, wanted, max_gap=longest)
+    runs = run_all(recording, wanted, max_gap=longest, offline=offline)
     remarks(runs)
     if plot is not None:
         _draw(recording, runs, plot)

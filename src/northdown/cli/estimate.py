@@ -11,8 +11,9 @@ from northdown.cli import console, gate
 from northdown.cli.output import FIGURE_SUFFIXES, ORIENTATION_SUFFIXES, check_target, write_orientation
 from northdown.cli.parameters import read_assignments
 from northdown.cli.reading import Reading, reads_recording
-from northdown.cli.selection import DEFAULT_ESTIMATOR, check_sensors
+from northdown.cli.selection import DEFAULT_ESTIMATOR, check_sensors, check_smooths
 from northdown.cli.summary import summarise
+from northdown.errors import InputError, expected
 
 if TYPE_CHECKING:
     from northdown.orientation import Orientation
@@ -35,6 +36,9 @@ def estimate(
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="FILE", help="Draw the Euler angles: .png, .svg or .pdf.")
     ] = None,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="Use the whole recording, past and future, for each sample.")
+    ] = False,
     max_gap: gate.MaxGap = gate.MAX_GAP_TEXT,
     force: gate.Force = False,
 ) -> None:
@@ -43,6 +47,10 @@ def estimate(
 
     chosen = get(estimator)
     configured = chosen(**read_assignments(chosen, parameter))
+    if offline:
+        check_smooths(chosen)
+        if max_gap != gate.MAX_GAP_TEXT:
+            raise InputError(expected("either --offline or --max-gap", "both", do="leave one out"))
     if output is not None and output != "-":
         check_target("--output", output, source=reading.source, suffixes=ORIENTATION_SUFFIXES)
     if plot is not None:
@@ -51,8 +59,8 @@ def estimate(
     recording = reading.load()
     check_sensors(chosen, recording)
     gate.admit(recording, [chosen], max_gap=longest, force=force)
-    orientation = configured.run(recording, max_gap=longest)
-    rows = summarise(recording, configured, orientation)
+    orientation = configured.smooth(recording) if offline else configured.run(recording, max_gap=longest)
+    rows = summarise(recording, configured, orientation, offline=offline)
     if output is not None:
         write_orientation(orientation, output)
     if plot is not None:

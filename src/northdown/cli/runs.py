@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from northdown.cli import console
@@ -28,7 +29,7 @@ class Run:
     Parameters
     ----------
     name : str
-        The estimator's name.
+        The estimator's name; "(offline)" after it where it used the whole recording for each sample.
     orientation : Orientation, optional
         None when the estimator could not run.
     nanoseconds : float
@@ -46,21 +47,30 @@ class Run:
     problem: str = ""
 
 
-def run_all(recording: Recording, estimators: Sequence[type[Estimator]], *, max_gap: float) -> list[Run]:
+def run_all(
+    recording: Recording, estimators: Sequence[type[Estimator]], *, max_gap: float, offline: bool = False
+) -> list[Run]:
     """Run estimators with their default parameters; best first where there is a reference.
+
+    With `offline`, those that smooth do so too.
 
     Raises
     ------
     InputError
         When none of them could run: the first one's reason.
     """
-    by_name = {e.name: e() for e in estimators}
+    ways: dict[str, Callable[[Recording], Orientation]] = {}
+    for chosen in estimators:
+        estimator = chosen()
+        ways[chosen.name] = partial(estimator.run, max_gap=max_gap)
+        if offline and chosen.smooths:
+            ways[f"{chosen.name} (offline)"] = estimator.smooth
     runs: list[Run] = []
-    with console.progress(list(by_name), "running") as names:
+    with console.progress(list(ways), "running") as names:
         for name in names:
             first = next((r.orientation for r in runs if r.orientation is not None), None)
             try:
-                runs.append(_run(by_name[name], recording, first, max_gap))
+                runs.append(_run(name, ways[name], recording, first))
             except InputError as problem:
                 runs.append(Run(name, problem=str(problem)))
     if runs and all(run.orientation is None for run in runs):
@@ -70,13 +80,13 @@ def run_all(recording: Recording, estimators: Sequence[type[Estimator]], *, max_
     return runs
 
 
-def _run(estimator: Estimator, recording: Recording, first: Orientation | None, max_gap: float) -> Run:
+def _run(name: str, way: Callable[[Recording], Orientation], recording: Recording, first: Orientation | None) -> Run:
     from northdown.evaluation import attitude_error
 
     # compile, or load the compiled code, outside of what is timed
-    estimator.run(recording[:1], max_gap=max_gap)
+    way(recording[:1])
     begin = time.perf_counter_ns()
-    orientation = estimator.run(recording, max_gap=max_gap)
+    orientation = way(recording)
     nanoseconds = (time.perf_counter_ns() - begin) / max(len(recording), 1)
     try:
         if recording.reference is not None:
@@ -84,8 +94,8 @@ def _run(estimator: Estimator, recording: Recording, first: Orientation | None, 
         else:
             error = attitude_error(orientation, orientation if first is None else first)
     except InputError as problem:
-        return Run(estimator.name, orientation, nanoseconds, problem=str(problem))
-    return Run(estimator.name, orientation, nanoseconds, error)
+        return Run(name, orientation, nanoseconds, problem=str(problem))
+    return Run(name, orientation, nanoseconds, error)
 
 
 def error_table(runs: Sequence[Run], *, end_heading: bool) -> None:

@@ -38,6 +38,19 @@ def check_sensors(estimator: type[Estimator], recording: Recording) -> None:
         )
 
 
+def check_smooths(estimator: type[Estimator]) -> None:
+    """Raise, with the names of those that can, when the estimator cannot use the whole recording."""
+    from northdown.estimators import registry
+
+    if not estimator.smooths:
+        able = [name for name, other in registry().items() if other.smooths]
+        raise InputError(
+            expected(
+                "an estimator that smooths for --offline", estimator.name, do=f"choose {' or '.join(able)} with -e"
+            )
+        )
+
+
 def named(texts: Sequence[str]) -> list[type[Estimator]]:
     """Estimators from names separated by commas, each once, in the order given."""
     from northdown.estimators import get

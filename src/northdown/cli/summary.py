@@ -21,11 +21,13 @@ _ALIGNED = {
 }
 
 
-def summarise(recording: Recording, estimator: Estimator, orientation: Orientation) -> list[tuple[str, str]]:
+def summarise(
+    recording: Recording, estimator: Estimator, orientation: Orientation, *, offline: bool = False
+) -> list[tuple[str, str]]:
     """Labelled lines: what was run, where it ended, how sure it is, and its error where the truth is known."""
     rows = [
         ("Recording", f"{recording.name or 'standard input'}, {len(recording)} samples, {recording.duration:.1f} s"),
-        ("Estimator", estimator.name + _settings(estimator)),
+        ("Estimator", estimator.name + _settings(estimator) + (", offline" if offline else "")),
     ]
     if not len(orientation):
         return rows
