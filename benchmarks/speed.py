@@ -68,7 +68,7 @@ def bench_batch(recording: nd.Recording, rounds: int) -> None:
     estimator = nd.Mahony()
     kernel, work = estimator.kernel, estimator.stream(frame=recording.frame)._work
     start, out, flags = work.state.copy(), np.empty((n, 7)), np.zeros(n, np.uint8)
-    data = (recording.time, recording.gyr, recording.acc, recording.mag)
+    data = (recording.time, recording.gyr, recording.acc, recording.mag, np.empty((n, 0)))
 
     def bare() -> None:
         work.state[:] = start

@@ -55,6 +55,9 @@ if TYPE_CHECKING:
     from northdown.estimators.double_stage_ekf import DoubleStageEKF
     from northdown.estimators.euler_ukf import EulerUKF
     from northdown.estimators.gyro_euler_ekf import GyroEulerEKF
+    from northdown.estimators.gyro_free_direct import GyroFreeDirect
+    from northdown.estimators.gyro_free_indirect import GyroFreeIndirect
+    from northdown.estimators.gyro_free_mekf import GyroFreeMEKF
     from northdown.estimators.gyro_integration import GyroIntegration
     from northdown.estimators.madgwick import Madgwick
     from northdown.estimators.mahony import Mahony
@@ -81,6 +84,9 @@ __all__ = [
     "Flag",
     "FormatError",
     "GyroEulerEKF",
+    "GyroFreeDirect",
+    "GyroFreeIndirect",
+    "GyroFreeMEKF",
     "GyroIntegration",
     "InputError",
     "Madgwick",

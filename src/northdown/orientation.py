@@ -50,6 +50,10 @@ class Flag(enum.IntFlag):
     """Linear acceleration is so strong that the accelerometer's sample was given less than a tenth of its weight."""
 
 
+# Optional fields with a vector in body axes for each sample.
+_VECTORS = ("gyr_bias", "gyr_bias_sigma", "rate", "rate_sigma")
+
+
 @dataclass(frozen=True, eq=False)
 class Orientation:
     """Orientation of a body over time.
@@ -70,6 +74,10 @@ class Orientation:
         Estimated gyroscope bias, rad/s, in body axes.
     gyr_bias_sigma : (N, 3) array, optional
         Standard deviation of `gyr_bias`, rad/s.
+    rate : (N, 3) array, optional
+        Estimated angular rate, rad/s, in body axes, of methods that have no gyroscope.
+    rate_sigma : (N, 3) array, optional
+        Standard deviation of `rate`, rad/s.
     flags : (N,) array of int, optional
         Bits of `Flag`; zero when not given.
     diagnostics : mapping of str to (N,) array
@@ -96,6 +104,8 @@ class Orientation:
     flags: npt.NDArray[np.integer[Any]] = field(default=None)  # type: ignore[arg-type]
     diagnostics: Mapping[str, FloatArray] = field(default_factory=dict)
     name: str = ""
+    rate: FloatArray | None = None
+    rate_sigma: FloatArray | None = None
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -110,10 +120,9 @@ class Orientation:
                 raise InputError(expected(f"covariance of shape ({n}, 3, 3)", f"shape {cov.shape}"))
             check_no_infinity("covariance", cov.reshape(n, 9))
             set_field(self, "covariance", cov)
-        if self.gyr_bias is not None:
-            set_field(self, "gyr_bias", check_vectors("gyr_bias", self.gyr_bias, n))
-        if self.gyr_bias_sigma is not None:
-            set_field(self, "gyr_bias_sigma", check_vectors("gyr_bias_sigma", self.gyr_bias_sigma, n))
+        for key in _VECTORS:
+            if getattr(self, key) is not None:
+                set_field(self, key, check_vectors(key, getattr(self, key), n))
         flags = np.zeros(n, np.uint8) if self.flags is None else np.asarray(self.flags)
         if flags.shape != (n,) or flags.dtype.kind not in "iub":
             raise InputError(expected(f"flags of shape ({n},) of integers", f"shape {flags.shape}, {flags.dtype}"))
@@ -131,9 +140,7 @@ class Orientation:
         """Build from arrays that northdown itself has just computed, without checking them again."""
         self = object.__new__(cls)
         absent: dict[str, Any] = {
-            "covariance": None,
-            "gyr_bias": None,
-            "gyr_bias_sigma": None,
+            **dict.fromkeys(("covariance", *_VECTORS)),
             "diagnostics": {},
             "name": "",
         }
@@ -152,7 +159,7 @@ class Orientation:
 
     def __repr__(self) -> str:
         span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "no samples"
-        extras = [n for n in ("covariance", "gyr_bias") if getattr(self, n) is not None]
+        extras = [n for n in ("covariance", "gyr_bias", "rate") if getattr(self, n) is not None]
         return f"<Orientation {self.name or 'unnamed'}: {len(self)} samples, {span}, body → {self.frame}" + (
             f", with {' and '.join(extras)}>" if extras else ">"
         )
@@ -165,7 +172,7 @@ class Orientation:
         return replace(self, **pick)
 
     def _arrays(self) -> Iterator[tuple[str, Any]]:
-        for key in ("time", "quat", "covariance", "gyr_bias", "gyr_bias_sigma", "flags"):
+        for key in ("time", "quat", "covariance", *_VECTORS, "flags"):
             value = getattr(self, key)
             if value is not None:
                 yield key, value
@@ -201,7 +208,7 @@ class Orientation:
         left : Rotation, optional
             Turns the navigation frame; the covariance turns with it.
         right : Rotation, optional
-            Turns the body frame, as when the sensor is remounted; the gyroscope bias turns with it.
+            Turns the body frame, as when the sensor is remounted; gyroscope bias and rate turn with it.
 
         Raises
         ------
@@ -210,18 +217,19 @@ class Orientation:
         """
         left, right = check_single_rotation("left", left), check_single_rotation("right", right)
         result = self.rotation
-        cov, bias, sigma = self.covariance, self.gyr_bias, self.gyr_bias_sigma
+        cov = self.covariance
+        vectors = {key: getattr(self, key) for key in _VECTORS}
         if left is not None:
             result = left * result
             mat = left.as_matrix()
             cov = None if cov is None else mat @ cov @ mat.T
         if right is not None:
             result = result * right
-            bias = None if bias is None else right.inv().apply(bias)
-            # the sigmas of single axes say nothing of other axes
-            sigma = None
+            for key, value in vectors.items():
+                # the sigmas of single axes say nothing of other axes
+                vectors[key] = None if value is None or key.endswith("sigma") else right.inv().apply(value)
         quat = np.roll(result.as_quat(), 1, axis=-1)
-        return replace(self, quat=quat, covariance=cov, gyr_bias=bias, gyr_bias_sigma=sigma)
+        return replace(self, quat=quat, covariance=cov, **vectors)
 
     def as_euler(self, convention: str = "zyx", *, degrees: bool = False) -> FloatArray:
         """Euler angles, (N, 3), in rad unless `degrees`.
@@ -242,8 +250,8 @@ class Orientation:
     def at(self, time: npt.ArrayLike) -> Orientation:
         """Orientation at other times (s) within the span, not decreasing, by spherical linear interpolation.
 
-        Covariance and bias are interpolated linearly; flags of both neighbours are combined. Where several samples
-        have the time that is asked for, the last of them is taken. Gaps are bridged like any other step.
+        Covariance, bias and rate are interpolated linearly; flags of both neighbours are combined. Where several
+        samples have the time that is asked for, the last of them is taken. Gaps are bridged like any other step.
 
         Raises
         ------
@@ -273,19 +281,19 @@ class Orientation:
             return x[left] * (1.0 - k) + x[right] * k
 
         flags = self.flags[left] | self.flags[right] * (u > 0.0)
+        vectors: dict[str, Any] = {key: blend(getattr(self, key)) for key in _VECTORS}
         return replace(
             self,
             time=t,
             quat=quat,
             covariance=blend(self.covariance),
-            gyr_bias=blend(self.gyr_bias),
-            gyr_bias_sigma=blend(self.gyr_bias_sigma),
+            **vectors,
             flags=flags,
             diagnostics={k: x[left] * (1.0 - u) + x[right] * u for k, x in self.diagnostics.items()},
         )
 
     def to_pandas(self, convention: str = "zyx") -> pd.DataFrame:
-        """Table with one row per sample: quaternion, Euler angles (rad), sigmas (rad), bias (rad/s), flags."""
+        """Table, one row per sample: quaternion, Euler angles (rad), covariance (rad²), rates (rad/s) and flags."""
         import pandas as pd
 
         columns: dict[str, npt.NDArray[Any]] = {"time": self.time}
@@ -295,10 +303,10 @@ class Orientation:
         if self.covariance is not None:
             for i, j in zip(*np.triu_indices(3), strict=True):
                 columns[f"cov_{'xyz'[i]}{'xyz'[j]}"] = self.covariance[:, i, j]
-        if self.gyr_bias is not None:
-            columns |= {f"gyr_bias_{c}": self.gyr_bias[:, i] for i, c in enumerate("xyz")}
-        if self.gyr_bias_sigma is not None:
-            columns |= {f"gyr_bias_sigma_{c}": self.gyr_bias_sigma[:, i] for i, c in enumerate("xyz")}
+        for key in _VECTORS:
+            value = getattr(self, key)
+            if value is not None:
+                columns |= {f"{key}_{c}": value[:, i] for i, c in enumerate("xyz")}
         columns["flags"] = self.flags
         table = pd.DataFrame(columns)
         table.attrs = {"frame": self.frame, "name": self.name}

@@ -11,6 +11,7 @@ import typing
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
+from northdown.arrays import AccelerometerArray
 from northdown.errors import InputError, expected
 
 if TYPE_CHECKING:
@@ -114,6 +115,8 @@ def describe(estimator: type[Estimator]) -> dict[str, Parameter]:
         if types.NoneType in typing.get_args(hint):
             metadata["optional"] = True
             hint = next(a for a in typing.get_args(hint) if a is not types.NoneType)
+        if isinstance(hint, type) and issubclass(hint, AccelerometerArray):  # not to be written as a text
+            continue
         kind: Literal["number", "whole number", "switch", "choice"] = "number"
         if typing.get_origin(hint) is Literal:
             kind = "choice"

@@ -18,7 +18,7 @@ def missing_sensors(estimator: type[Estimator], recording: Recording) -> list[st
     """Sensors that the estimator needs and of which the recording has not one sample."""
     import numpy as np
 
-    values = {sensor: getattr(recording, sensor) for sensor in estimator.needs}
+    values = {s: recording.array_acc if s == "array" else getattr(recording, s) for s in estimator.needs}
     return [s for s, value in values.items() if value is None or np.isnan(value).any(axis=1).all()]
 
 
@@ -60,12 +60,17 @@ def named(texts: Sequence[str]) -> list[type[Estimator]]:
 
 
 def all_for(recording: Recording) -> tuple[list[type[Estimator]], list[str]]:
-    """Every estimator for which the sensors suffice, the default first, and why each of the others was left out."""
+    """Every estimator for which the sensors suffice, the default first, and why each of the others was left out.
+
+    Those for accelerometer arrays go without saying where there is none.
+    """
     from northdown.estimators import registry
 
     able, left_out = [], []
     for name, estimator in sorted(registry().items(), key=lambda item: item[0] != DEFAULT_ESTIMATOR):
         missing = missing_sensors(estimator, recording)
+        if "array" in missing:
+            continue
         if missing:
             left_out.append(f"{name} (needs {' and '.join(missing)})")
         else:

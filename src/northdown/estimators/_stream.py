@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from northdown.estimators.base import Estimator
 
-_ORIENTATION_FIELDS = ("gyr_bias", "gyr_bias_sigma")
+_ORIENTATION_FIELDS = ("gyr_bias", "gyr_bias_sigma", "rate", "rate_sigma")
 _NO_SAMPLE: FloatArray = np.full(3, np.nan)
 
 
@@ -71,7 +71,7 @@ class Stream:
         state[PENDING] = pending
         state[LAST] = math.nan
         max_gap = check_number("max_gap", max_gap, low=0.0, unit="s")
-        state[MAX_GAP] = max_gap if "gyr" in estimator.uses else math.inf
+        state[MAX_GAP] = max_gap if {"gyr", "array"} & set(estimator.uses) else math.inf
         state[PERIOD] = math.nan if rate is None else 1.0 / check_number("rate", rate, above=0.0, unit="Hz")
         state[N_RUNNER : N_RUNNER + 4] = start
         state[N_RUNNER + 4 :] = estimator._initial_state(start, self.frame)
@@ -145,7 +145,7 @@ class Stream:
     def _update_converted(self, code: int, gyr: Any, acc: Any, mag: Any, time: Any) -> int:
         """Try again with converted arguments if that was the trouble, else say what was wrong."""
         count = int(self._work.state[COUNT])
-        samples = {"gyr": _vector("gyr", gyr), "acc": _vector("acc", acc), "mag": _vector("mag", mag)}
+        samples = {"gyr": vector("gyr", gyr), "acc": vector("acc", acc), "mag": vector("mag", mag)}
         if code == -1 - NO_VECTOR:
             time = check_number("time", time)
             code = self._update(self._whole, time, *samples.values())
@@ -175,7 +175,7 @@ class Stream:
     def _record(self, recording: Recording) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
         """All that the kernel records over a recording, (N, n_out), and the flags."""
         kernel, n = self.estimator.kernel, len(recording)
-        sensors = three_sensors(self.estimator, recording)
+        sensors = all_samples(self.estimator, recording)
         out = np.empty((n, kernel.n_out))
         flags = np.zeros(n, np.uint8)
         work = self._work
@@ -198,40 +198,35 @@ class Stream:
             )
         if code == GYRO_GAP:
             limit = self._work.state[MAX_GAP]
+            sensor = "a gyroscope" if "gyr" in self.estimator.uses else "an array"
             raise InputError(
                 expected(
-                    f"a gyroscope sample at least every {limit:g} s",
+                    f"{sensor} sample at least every {limit:g} s",
                     "NaN for longer",
                     at=at,
                     do="cut the recording there, or raise max_gap",
                 )
             )
-        raise InputError(
-            expected(
-                "an attitude of finite numbers",
-                "an overflow",
-                at=at,
-                do="check the units of gyr, acc and mag",
-            )
-        )
+        do = "check the units of gyr, acc and mag"
+        if "array" in self.estimator.uses:
+            do = "check the array's geometry and units; where the body accelerates, use gyro-free-mekf"
+        raise InputError(expected("an attitude of finite numbers", "an overflow", at=at, do=do))
 
 
-def three_sensors(estimator: Estimator, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """gyr, acc and mag, (N, 3) each, of a recording that has what the estimator needs.
+def all_samples(estimator: Estimator, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """gyr, acc and mag, (N, 3) each, of a recording that has what the estimator needs, and what goes beside them.
 
     A sensor that is not there has NaN; a gyroscope that is not there measures no rate.
     """
-    absent = [s for s in estimator.needs if getattr(recording, s) is None]
-    if absent:
-        raise InputError(
-            expected(f"{' and '.join(estimator.needs)} for {estimator.name}", f"no {' and no '.join(absent)}")
-        )
+    estimator.check_sensors(recording)
+    gyr, acc, mag, extra = estimator.samples(recording)
     shape = (len(recording), 3)
-    nothing = np.full(shape, np.nan) if recording.acc is None or recording.mag is None else np.empty((0, 3))
+    nothing = np.full(shape, np.nan) if acc is None or mag is None else np.empty((0, 3))
     return (
-        np.zeros(shape) if recording.gyr is None else recording.gyr,
-        nothing if recording.acc is None else recording.acc,
-        nothing if recording.mag is None else recording.mag,
+        np.zeros(shape) if gyr is None else gyr,
+        nothing if acc is None else acc,
+        nothing if mag is None else mag,
+        np.empty((shape[0], 0)) if extra is None else extra,
     )
 
 
@@ -261,10 +256,11 @@ def _start(turn: FloatArray, initial: Rotation | None) -> tuple[FloatArray, int]
     return np.roll((to_ned * initial).as_quat(), 1), 0
 
 
-def _vector(name: str, value: npt.ArrayLike) -> FloatArray:
+def vector(name: str, value: npt.ArrayLike) -> FloatArray:
+    """One sample as the compiled code takes it, or what is wrong with it."""
     array = as_float_array(name, value)
     if array.shape != (3,):
         raise InputError(expected(f"{name} of shape (3,)", f"shape {array.shape}"))
-    vector = np.empty(3)  # aligned, writable, of NumPy's own float64
-    vector[:] = array
-    return vector
+    result = np.empty(3)  # aligned, writable, of NumPy's own float64
+    result[:] = array
+    return result

@@ -13,11 +13,12 @@ import types
 import typing
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from northdown._validation import FloatArray, check_choice, check_number
+from northdown.arrays import AccelerometerArray
 from northdown.errors import InputError, expected
 from northdown.estimators._stream import Stream
 from northdown.frames import Frame
@@ -42,6 +43,18 @@ def parameter(
     return dataclasses.field(default=default, metadata=metadata)
 
 
+class Samples(NamedTuple):
+    """What a kernel takes in the places of gyroscope, accelerometer and magnetometer: (N, 3) arrays, or None.
+
+    Extra is what it takes beside them, (N, `Kernel.n_extra`).
+    """
+
+    gyr: FloatArray | None
+    acc: FloatArray | None
+    mag: FloatArray | None
+    extra: FloatArray | None = None
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Estimator(abc.ABC):
     """Base of all estimators: parameters are checked here, and `run` and `stream` are the same for all."""
@@ -54,8 +67,8 @@ class Estimator(abc.ABC):
     """Sensors that the filter's steps use."""
     kernel: ClassVar[Kernel]
     outputs: ClassVar[Mapping[str, slice]] = types.MappingProxyType({})
-    """Where `gyr_bias`, its sigma and the `covariance` (nine entries by rows) stand in what the kernel records;
-    other names, of one column each, become `Orientation.diagnostics`."""
+    """Where `gyr_bias`, `rate`, their sigmas and the `covariance` (nine entries by rows) stand in what the kernel
+    records; other names, of one column each, become `Orientation.diagnostics`."""
     smooths: ClassVar[bool] = False
     """Whether `smooth` can be called."""
     singular: ClassVar[str] = ""
@@ -73,6 +86,14 @@ class Estimator(abc.ABC):
             elif hint is bool:
                 if not isinstance(value, (bool, np.bool_)):
                     raise InputError(expected(f"true or false for {f.name}", repr(value)))
+            elif AccelerometerArray in typing.get_args(hint):
+                if not isinstance(value, AccelerometerArray):
+                    raise InputError(expected(f"an AccelerometerArray for {f.name}", type(value).__name__))
+            elif hint is int:
+                number = check_number(f.name, value, **f.metadata)
+                if number != int(number):
+                    raise InputError(expected(f"a whole number for {f.name}", f"{number:g}"))
+                object.__setattr__(self, f.name, int(number))
             else:
                 number = check_number(f.name, value, **f.metadata)
                 object.__setattr__(self, f.name, number)
@@ -84,6 +105,20 @@ class Estimator(abc.ABC):
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         """The kernel's state after the quaternion, for the attitude `quat` (body → NED) at the start."""
         return (0.0,) * (self.kernel.n_state - 4)
+
+    def for_recording(self, recording: Recording) -> Estimator:
+        """Copy with what is taken from a recording beside the samples: the geometry of an array."""
+        return self
+
+    def check_sensors(self, recording: Recording) -> None:
+        """Raise InputError when a needed sensor is missing from a recording."""
+        absent = [sensor for sensor in self.needs if getattr(recording, sensor) is None]
+        if absent:
+            raise InputError(expected(f"{' and '.join(self.needs)} for {self.name}", f"no {' and no '.join(absent)}"))
+
+    def samples(self, recording: Recording) -> Samples:
+        """What the kernel takes of a recording in the places of gyroscope, accelerometer and magnetometer."""
+        return Samples(recording.gyr, recording.acc, recording.mag)
 
     def run(
         self,
@@ -120,7 +155,9 @@ class Estimator(abc.ABC):
             When a sensor is missing, time runs backwards, the gyroscope is silent for longer than `max_gap`, or
             the values are so large that the result is no number.
         """
-        stream = self.stream(frame=frame or recording.frame, initial=initial, max_gap=max_gap)
+        self.check_sensors(recording)
+        this = self.for_recording(recording)
+        stream = this.stream(frame=frame or recording.frame, initial=initial, max_gap=max_gap)
         return stream.run(recording)
 
     def smooth(self, recording: Recording, *, frame: str | None = None) -> Orientation:

@@ -56,7 +56,7 @@ import numpy as np
 from northdown._validation import FloatArray
 from northdown.estimators import _vqf_smooth
 from northdown.estimators import _vqf_step as vqf
-from northdown.estimators._stream import outputs, three_sensors
+from northdown.estimators._stream import all_samples, outputs
 from northdown.estimators._vqf_layout import N_PARAMS, N_STATE, steady_state
 from northdown.estimators.base import Estimator, parameter
 from northdown.frames import Frame
@@ -257,7 +257,7 @@ class VQF(Estimator):
         ahead, flags = stream._record(recording)
         if not len(recording):
             return stream.run(recording)
-        time, sensors = recording.time, three_sensors(self, recording)
+        time, sensors = recording.time, all_samples(self, recording)[:3]
         gyr, acc, mag = (np.ascontiguousarray(x[::-1]) for x in sensors)
         # gaps of the gyroscope that are too long have been found by the first run
         backward = self.stream(max_gap=float(np.finfo(float).max))

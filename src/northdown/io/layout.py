@@ -37,7 +37,7 @@ KEYS: Final = (
 """Keys of the metadata; ``northdown`` says what it is: ``"recording"`` or ``"orientation"``."""
 
 _MAX_META: Final = 1 << 18
-_VECTORS: Final = ("gyr_bias", "gyr_bias_sigma")
+_VECTORS: Final = ("gyr_bias", "gyr_bias_sigma", "rate", "rate_sigma")
 _TRIU: Final = tuple((i, j, f"{'xyz'[i]}{'xyz'[j]}") for i, j in zip(*np.triu_indices(3), strict=True))
 
 

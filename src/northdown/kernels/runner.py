@@ -2,7 +2,8 @@
 
 A filter is a function ``step(p, s, dt, gyr, acc, mag) -> s`` on tuples: parameters p, state s whose first four
 entries are the attitude quaternion (body to NED), time since the last sample, and the three sensor vectors.
-NaN in acc or mag means that there is no sample. :class:`Kernel` compiles the loop around it.
+NaN in acc or mag means that there is no sample. A filter that takes more numbers a sample has ``n_extra`` of them in
+one more tuple at the end. :class:`Kernel` compiles the loop around it.
 
 What all filters share is done here, once: the start from the first usable accelerometer and magnetometer
 samples, holding the last rate through short gaps of the gyroscope, and turning the result to the frame asked for.
@@ -96,12 +97,35 @@ def start_tilt(q: Any, acc: Any) -> Any:
     return multiply(tilt_correction(q, acc), q)
 
 
-def _make_tick(kernel: Kernel) -> Callable[..., Any]:
-    """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
-    step, aligned, flagged, memoryless = kernel.step, kernel.aligned, kernel.flagged, kernel.memoryless
+def _ignoring_extra(step: Step) -> Step:
+    @inline
+    def same(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) -> Any:
+        return step(p, s, dt, gyr, acc, mag)
+
+    return same
+
+
+def _make_extra(n_extra: int) -> Callable[..., Any]:
+    """Build what reads the further numbers of a sample; nothing at all where there are none."""
 
     @inline
-    def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
+    def numbers(array: Any, first: int) -> Any:
+        return to_fixed_tuple(array[first:], n_extra)
+
+    @inline
+    def none(array: Any, first: int) -> Any:
+        return ()
+
+    return numbers if n_extra else none
+
+
+def _make_tick(kernel: Kernel) -> Callable[..., Any]:
+    """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
+    aligned, flagged, memoryless = kernel.aligned, kernel.flagged, kernel.memoryless
+    step = kernel.step if kernel.n_extra else _ignoring_extra(kernel.step)
+
+    @inline
+    def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) -> Any:
         pending, hx, hy, hz, gap, max_gap = r
         flags = 0
         code = OK
@@ -116,13 +140,13 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
             if gap > max_gap:
                 code = GYRO_GAP
         if pending == 0.0:
-            s = step(p, s, dt, gyr, acc, mag)
+            s = step(p, s, dt, gyr, acc, mag, extra)
             flags |= flagged(p, s)
         else:
             nothing = (_NAN, _NAN, _NAN)
             tilt_pending = pending != float(HEADING_UNKNOWN)
             tilt_now = tilt_pending and dot(acc, acc) > 0.0
-            s = step(p, s, dt, gyr, nothing if tilt_pending else acc, nothing)
+            s = step(p, s, dt, gyr, nothing if tilt_pending else acc, nothing, extra)
             q = (s[0], s[1], s[2], s[3])
             if tilt_now:
                 q = start_tilt(q, acc)
@@ -136,7 +160,7 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
             if tilt_now or heading_now:
                 s = aligned(p, s, q, pending == 0.0)
                 if memoryless:
-                    s = step(p, s, 0.0, gyr, acc, mag)
+                    s = step(p, s, 0.0, gyr, acc, mag, extra)
             flags |= int(pending) if pending > 0.0 else flagged(p, s)
         return code, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
 
@@ -144,10 +168,9 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
 
 
 def _make_run(kernel: Kernel) -> Callable[..., Any]:
-    tick = _make_tick(kernel)
-    output = kernel.output
+    tick, output = _make_tick(kernel), kernel.output
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
-    first = kernel.covariance
+    first, extra = kernel.covariance, _make_extra(kernel.n_extra)
 
     def run(
         params: Array,
@@ -157,6 +180,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
         gyr: Array,
         acc: Array,
         mag: Array,
+        more: Array,
         out: Array,
         flags: npt.NDArray[np.uint8],
     ) -> tuple[int, int]:
@@ -183,6 +207,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
                 (gyr[i, 0], gyr[i, 1], gyr[i, 2]),
                 (acc[i, 0], acc[i, 1], acc[i, 2]),
                 (mag[i, 0], mag[i, 1], mag[i, 2]),
+                extra(more[i], 0),
             )
             last = time[i]
             if flag != 0:
@@ -229,7 +254,9 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
     is_vector, vector, doubles = reading.is_vector, reading.vector, reading.doubles
     first_state = _N_TURN + n_params
     first_out = first_state + N_RUNNER + n_state
-    n_work = first_out + n_out
+    first_extra = first_out + n_out
+    extra = _make_extra(kernel.n_extra)
+    n_work = first_extra + kernel.n_extra
 
     def update(whole: Any, time: float, gyr: Any, acc: Any, mag: Any) -> Any:
         if not (is_vector(whole, gyr) and is_vector(whole, acc) and is_vector(whole, mag)):
@@ -255,7 +282,7 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
         p = to_fixed_tuple(work[_N_TURN:], n_params)
         s = to_fixed_tuple(state[N_RUNNER:], n_state)
         r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
-        code, flag, s, r = tick(p, s, r, dt, rate, force, field)
+        code, flag, s, r = tick(p, s, r, dt, rate, force, field, extra(work, first_extra))
         if code != OK:
             return -1 - code
         o = output(p, s)
@@ -285,7 +312,7 @@ _TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)
 _ROWS: Any = numba.types.Array(numba.float64, 2, "C", readonly=True)
 _RUN_SIGNATURE: Final = (
     *(_VECTOR, _VECTOR, _VECTOR),
-    *(_TIMES, _ROWS, _ROWS, _ROWS),
+    *(_TIMES, _ROWS, _ROWS, _ROWS, _ROWS),
     *(numba.float64[:, ::1], numba.uint8[::1]),
 )
 
@@ -301,6 +328,8 @@ class Workspace(NamedTuple):
     """The runner's entries, then the filter's."""
     out: Array
     """What was recorded of the last live sample; the first four entries are its attitude."""
+    extra: Array
+    """Further numbers of the next live sample, to be written before `update`."""
 
 
 @dataclass(frozen=True)
@@ -330,13 +359,15 @@ class Kernel:
     memoryless : bool
         Whether the step also takes the samples from which the start was found. A filter must not: it would count
         them twice.
+    n_extra : int
+        How many numbers a sample has beside the three vectors.
 
     Notes
     -----
-    ``run(params, state, turn, time, gyr, acc, mag, out, flags)`` works through arrays and returns a code and the
-    number of samples done. ``update(whole, time, gyr, acc, mag)`` takes one sample, returns its flags or −1 − code,
-    and on failure leaves the state as it was. The arrays are those of `workspace`. `update` takes anything for a
-    sample: what is not an array of three float64 gives −1 − NO_VECTOR (or TypeError).
+    ``run(params, state, turn, time, gyr, acc, mag, extra, out, flags)`` works through arrays (extra: (N, n_extra))
+    and returns a code and the number of samples done. ``update(whole, time, gyr, acc, mag)`` takes one sample,
+    returns its flags or −1 − code, and on failure leaves the state as it was. The arrays are those of `workspace`.
+    `update` takes anything for a sample: what is not an array of three float64 gives −1 − NO_VECTOR (or TypeError).
     """
 
     name: str
@@ -349,10 +380,11 @@ class Kernel:
     flagged: Callable[..., int] = no_flags
     memoryless: bool = False
     covariance: int = 0
+    n_extra: int = 0
 
     def workspace(self) -> Workspace:
         """New arrays for one running estimate, all zero."""
-        ends = np.cumsum((_N_TURN, self.n_params, N_RUNNER + self.n_state, self.n_out))
+        ends = np.cumsum((_N_TURN, self.n_params, N_RUNNER + self.n_state, self.n_out, self.n_extra))
         whole = np.zeros(ends[-1])
         return Workspace(whole, *np.split(whole, ends[:-1]))
 
