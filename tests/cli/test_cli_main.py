@@ -87,7 +87,7 @@ def test_defect_is_one_line_and_code_1(run, monkeypatch):
         raise ZeroDivisionError("by zero")
 
     monkeypatch.setattr("northdown.simulation.simulate", broken)
-    monkeypatch.setattr("northdown.cli.demo._make_folder", Path)
+    monkeypatch.setattr("northdown.cli.demo.make_folder", Path)
     result = run("demo")
     assert (result.code, result.out) == (1, "")
     assert result.err.count("\n") == 1
@@ -111,7 +111,7 @@ def test_interrupt_is_code_130(run, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("northdown.simulation.simulate", interrupted)
-    monkeypatch.setattr("northdown.cli.demo._make_folder", Path)
+    monkeypatch.setattr("northdown.cli.demo.make_folder", Path)
     result = run("demo")
     assert (result.code, result.out, result.err) == (130, "", "interrupted\n")
 

@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import IO, Any
 
 from northdown.cli.wording import as_typed
@@ -102,6 +102,30 @@ def progress(names: Sequence[str], doing: str) -> Iterator[Iterator[str]]:
                 yield name
 
         yield steps()
+
+
+@contextlib.contextmanager
+def steps(total: int) -> Iterator[Callable[[str], None]]:
+    """A function to call with the name of each of `total` steps: a bar on standard error, when that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress, TimeElapsedColumn
+
+    with Progress(
+        *Progress.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
+    ) as bar:
+        task = bar.add_task("", total=total)
+        done = -1
+
+        def tell(name: str) -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, completed=done, description=escape(one_line(name)))
+
+        yield tell
 
 
 @contextlib.contextmanager

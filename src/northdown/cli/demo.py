@@ -10,8 +10,9 @@ import typer
 
 from northdown.cli import console, gate
 from northdown.cli.numbers import read_count, read_number
+from northdown.cli.output import make_folder
 from northdown.cli.runs import MOST_CURVES, Run, error_table, remarks, run_all
-from northdown.errors import InputError, MissingDependencyError, expected
+from northdown.errors import MissingDependencyError
 
 if TYPE_CHECKING:
     from northdown.recording import Recording
@@ -31,7 +32,7 @@ def demo(
 
     length = read_number("--duration", duration, low=5.0, high=_LONGEST, unit="s")
     number = read_count("--seed", seed)
-    folder = _make_folder(out)
+    folder = make_folder(out)
     recording = simulate(length, seed=number)
     print(f"A low-cost sensor in the hand, simulated: {length:g} s at {recording.rate:g} Hz, truth known.")
     runs = run_all(recording, all_for(recording)[0], max_gap=gate.DEFAULT_MAX_GAP)
@@ -43,16 +44,6 @@ def demo(
     print(f"\nWritten to {console.one_line(str(folder))}:")
     console.facts((f"  {name}", text) for name, text in written)
     _what_to_look_at(folder, runs)
-
-
-def _make_folder(out: str) -> Path:
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or str(problem)
-        raise InputError(expected("a folder that can be made for --out", f"{out!r} ({reason.lower()})")) from None
-    return folder
 
 
 def _write(folder: Path, recording: Recording, runs: Sequence[Run]) -> list[tuple[str, str]]:

@@ -25,6 +25,7 @@ from northdown.cli.estimators import estimators
 from northdown.cli.info import info
 from northdown.cli.navigate import navigate
 from northdown.cli.observability import observability
+from northdown.cli.reproduce import reproduce
 from northdown.cli.simulate import simulate
 from northdown.errors import NorthdownError
 
@@ -95,6 +96,7 @@ _COMMANDS = (
     allan,
     simulate,
     arrays,
+    reproduce,
     demo,
 )
 for _command in _COMMANDS:

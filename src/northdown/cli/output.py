@@ -40,6 +40,17 @@ def check_target(option: str, path: str, *, source: str, suffixes: tuple[str, ..
         raise InputError(expected(f"a name of its own for {option}", f"the input {path!r}", do="choose another name"))
 
 
+def make_folder(out: str) -> Path:
+    """Make the folder of --out, with those above it, unless it is there."""
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or str(problem)
+        raise InputError(expected("a folder that can be made for --out", f"{out!r} ({reason.lower()})")) from None
+    return folder
+
+
 def write_orientation(orientation: Orientation, path: str) -> None:
     """Write to a file by its suffix, or as CSV to standard output for ``-``."""
     import northdown.io

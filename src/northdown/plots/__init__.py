@@ -9,6 +9,7 @@ from northdown.plots._array import array
 from northdown.plots._consistency import consistency
 from northdown.plots._errors import errors
 from northdown.plots._euler import euler
+from northdown.plots._kao2006 import kao2006
 from northdown.plots._observability import observability
 from northdown.plots._path import path
 from northdown.plots._quaternion import quaternion
@@ -21,6 +22,7 @@ __all__ = [
     "consistency",
     "errors",
     "euler",
+    "kao2006",
     "observability",
     "path",
     "quaternion",
