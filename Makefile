@@ -33,6 +33,7 @@ lint: $(VENV)/.lint
 bench: $(VENV)/.peers
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/accuracy.py
+	$(BIN)/python benchmarks/flagship.py --part accuracy,ablation,coverage,time
 
 clean:
 	rm -rf $(VENV) demo-output benchmarks/_build

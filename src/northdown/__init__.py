@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         plots,
         simulation,
     )
+    from northdown.estimators.calibrating_ekf import CalibratingEKF
     from northdown.estimators.complementary import Complementary
     from northdown.estimators.cross_product import CrossProduct
     from northdown.estimators.double_stage_ekf import DoubleStageEKF
@@ -77,6 +78,7 @@ __all__ = [
     "MEKF",
     "VQF",
     "AccelerometerArray",
+    "CalibratingEKF",
     "Complementary",
     "CrossProduct",
     "DoubleStageEKF",

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import northdown as nd
+from northdown.cli.selection import DEFAULT_ESTIMATOR
 from northdown.estimators import registry
 
 
@@ -62,7 +63,7 @@ def test_without_reference_it_compares_with_the_first(run, recording, tmp_path):
     _, _, z, w = between[-1].as_quat()
     assert second["end_heading_deg"] == pytest.approx(np.degrees(2.0 * np.arctan(z / w)), rel=1e-9)
     text = run("compare", path)
-    assert "no reference, so RMS differences from mekf" in text.out
+    assert f"no reference, so RMS differences from {DEFAULT_ESTIMATOR}" in text.out
     assert "end heading" in text.out
     assert max(map(len, text.out.splitlines())) <= 80
 

@@ -71,7 +71,7 @@ def test_mistakes(run, csv, tmp_path):
     assert "either a recording, or --runs" in run("consistency", csv, "--seed", "5").error
     assert "name a file first" in run("consistency", "--rate", "5").error
     assert "name a file first" in run("consistency", "--force").error
-    assert "with a covariance out of double-stage-ekf" in run("consistency", "-e", "madgwick").error
+    assert "with a covariance out of calibrating-ekf" in run("consistency", "-e", "madgwick").error
     assert "--runs" in run("consistency", "--runs", "1").error
     assert "--runs" in run("consistency", "--runs", "many").error
     assert "--seed" in run("consistency", "--seed", "-4").error

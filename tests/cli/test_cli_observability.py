@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import northdown as nd
+from northdown.cli.selection import DEFAULT_ESTIMATOR
 from northdown.evaluation import observability
 from northdown.simulation import k06_sine, random_motion
 
@@ -116,7 +117,7 @@ def test_recording_without_a_reference_to_rely_on(run, recording, tmp_path, how)
         more = ["--align", "rotations"]
     result = run("observability", path, "--sensors", "acc", "--state", "tangent", *more)
     assert (result.code, result.err) == (0, "")
-    assert "an estimate of mekf" in result.out
+    assert f"an estimate of {DEFAULT_ESTIMATOR}" in result.out
     assert "heading" in result.out
     assert "an estimate of mahony" in run("observability", path, "-e", "mahony", *more).out
     assert "estimator" in run("observability", path, "-e", "nothing", *more).error

@@ -95,7 +95,7 @@ def _what_to_look_at(folder: Path, runs: Sequence[Run]) -> None:
     scored = {run.name: run.error.rmse() for run in runs if run.error is not None}
     best = next(iter(scored))
     print("\nWhat to look at:")
-    print(f"- {best} is best here, {scored[best].total_deg:.1f}° off. Another motion may have another winner.")
+    print(f"- {best} is best here, {scored[best].total_deg:.1f}° off. Other motions may have other winners.")
     if "gyro-integration" in scored:
         print(f"- gyro-integration drifts to {scored['gyro-integration'].total_deg:.1f}°: nothing corrects its bias.")
     if "tilt-compass" in scored:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from northdown.estimators import Estimator
     from northdown.recording import Recording
 
-DEFAULT_ESTIMATOR = "mekf"
+DEFAULT_ESTIMATOR = "calibrating-ekf"
 
 
 def missing_sensors(estimator: type[Estimator], recording: Recording) -> list[str]:

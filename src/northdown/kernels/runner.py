@@ -12,6 +12,7 @@ samples, holding the last rate through short gaps of the gyroscope, and turning 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,6 +56,8 @@ NO_VECTOR: Final = 4
 NO_TIME: Final = 5
 
 _NAN: Final = math.nan
+# A step that works in place cannot be taken back, so larger samples, which might overflow in it, are refused before.
+_LARGEST: Final = 1e12
 
 Array = npt.NDArray[np.float64]
 Step = Callable[..., tuple[float, ...]]
@@ -97,6 +100,32 @@ def start_tilt(q: Any, acc: Any) -> Any:
     return multiply(tilt_correction(q, acc), q)
 
 
+def _access(kernel: Kernel) -> tuple[Callable[..., Any], Callable[..., None]]:
+    """How the loops get at the filter's state: a tuple read and written back, or the array itself."""
+    n_state = kernel.n_state
+    if kernel.in_place:
+
+        @inline
+        def load(state: Any) -> Any:
+            return state[N_RUNNER:]
+
+        @inline
+        def save(state: Any, s: Any) -> None:
+            pass
+
+    else:
+
+        @inline
+        def load(state: Any) -> Any:
+            return to_fixed_tuple(state[N_RUNNER:], n_state)
+
+        @inline
+        def save(state: Any, s: Any) -> None:
+            put_tuple(state[N_RUNNER:], s)
+
+    return load, save
+
+
 def _ignoring_extra(step: Step) -> Step:
     @inline
     def same(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) -> Any:
@@ -119,7 +148,7 @@ def _make_extra(n_extra: int) -> Callable[..., Any]:
     return numbers if n_extra else none
 
 
-def _make_tick(kernel: Kernel) -> Callable[..., Any]:
+def make_tick(kernel: Kernel) -> Callable[..., Any]:
     """Build the work of one sample: hold the gyroscope, align while needed, take the filter's step."""
     aligned, flagged, memoryless = kernel.aligned, kernel.flagged, kernel.memoryless
     step = kernel.step if kernel.n_extra else _ignoring_extra(kernel.step)
@@ -128,7 +157,6 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
     def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) -> Any:
         pending, hx, hy, hz, gap, max_gap = r
         flags = 0
-        code = OK
         if gyr[0] == gyr[0] and gyr[1] == gyr[1] and gyr[2] == gyr[2]:
             gap = 0.0
             if dt > max_gap:
@@ -138,7 +166,7 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
             flags = GYRO_HELD
             gyr = (hx, hy, hz)
             if gap > max_gap:
-                code = GYRO_GAP
+                return GYRO_GAP, flags, s, (pending, hx, hy, hz, gap, max_gap)
         if pending == 0.0:
             s = step(p, s, dt, gyr, acc, mag, extra)
             flags |= flagged(p, s)
@@ -162,14 +190,15 @@ def _make_tick(kernel: Kernel) -> Callable[..., Any]:
                 if memoryless:
                     s = step(p, s, 0.0, gyr, acc, mag, extra)
             flags |= int(pending) if pending > 0.0 else flagged(p, s)
-        return code, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
+        return OK, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
 
     return tick
 
 
 def _make_run(kernel: Kernel) -> Callable[..., Any]:
-    tick, output = _make_tick(kernel), kernel.output
-    n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+    tick, output = make_tick(kernel), kernel.output
+    load, save = _access(kernel)
+    n_params, n_out = kernel.n_params, kernel.n_out
     first, extra = kernel.covariance, _make_extra(kernel.n_extra)
 
     def run(
@@ -185,7 +214,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
         flags: npt.NDArray[np.uint8],
     ) -> tuple[int, int]:
         p = to_fixed_tuple(params, n_params)
-        s = to_fixed_tuple(state[N_RUNNER:], n_state)
+        s = load(state)
         r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
         last = state[LAST]
         f = (turn[0], turn[1], turn[2], turn[3])
@@ -237,7 +266,7 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
                 if not is_attitude(out[i, 0], out[i, 1], out[i, 2], out[i, 3]):
                     done = i
                     break
-        put_tuple(state[N_RUNNER:], s)
+        save(state, s)
         for j in range(5):
             state[j] = r[j]
         state[LAST] = last
@@ -248,9 +277,11 @@ def _make_run(kernel: Kernel) -> Callable[..., Any]:
 
 
 def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
-    tick = _make_tick(kernel)
+    tick = make_tick(kernel)
     output = kernel.output
+    load, save = _access(kernel)
     n_params, n_state, n_out = kernel.n_params, kernel.n_state, kernel.n_out
+    largest = _LARGEST if kernel.in_place else sys.float_info.max
     is_vector, vector, doubles = reading.is_vector, reading.vector, reading.doubles
     first_state = _N_TURN + n_params
     first_out = first_state + N_RUNNER + n_state
@@ -263,7 +294,7 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
             return -1 - NO_VECTOR
         rate, force, field = vector(gyr), vector(acc), vector(mag)
         for component in rate + force + field:
-            if math.isinf(component):
+            if math.fabs(component) > largest:
                 return -1 - NOT_FINITE
         work = doubles(whole, n_work)
         turn = work[:_N_TURN]
@@ -280,7 +311,7 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
             if not dt >= 0.0 or time - time != 0.0:
                 return -1 - TIME_BACKWARDS
         p = to_fixed_tuple(work[_N_TURN:], n_params)
-        s = to_fixed_tuple(state[N_RUNNER:], n_state)
+        s = load(state)
         r = (state[0], state[1], state[2], state[3], state[4], state[MAX_GAP])
         code, flag, s, r = tick(p, s, r, dt, rate, force, field, extra(work, first_extra))
         if code != OK:
@@ -295,7 +326,7 @@ def _make_update(kernel: Kernel, reading: Reading) -> Callable[..., Any]:
             out[j] = q[j]
         for j in range(4, n_out):
             out[j] = o[j]
-        put_tuple(state[N_RUNNER:], s)
+        save(state, s)
         for j in range(5):
             state[j] = r[j]
         state[LAST] = time
@@ -356,6 +387,9 @@ class Kernel:
     covariance : int
         Where the nine entries of the attitude's covariance in NED stand in what is recorded, 0 for none. A whole
         recording's are turned to the frame of the result; a live sample's are not.
+    in_place : bool
+        Whether the state is an array that the functions above write into and return, rather than a tuple: for filters
+        of so many states that tuples are slow to compile.
     memoryless : bool
         Whether the step also takes the samples from which the start was found. A filter must not: it would count
         them twice.
@@ -381,6 +415,7 @@ class Kernel:
     memoryless: bool = False
     covariance: int = 0
     n_extra: int = 0
+    in_place: bool = False
 
     def workspace(self) -> Workspace:
         """New arrays for one running estimate, all zero."""

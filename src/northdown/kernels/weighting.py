@@ -27,13 +27,24 @@ def linear_acceleration(mean_square: float, force_n: Vector, g: float, dt: float
 
 
 @inline
+def departure(norm_gate: float, dip_gate: float, horizontal: float, down: float, h: float, z: float) -> float:
+    """Departure u of the field (h, z) from its reference (horizontal, down).
+
+    Of the difference, relative to the reference's size, the part along the reference is the departure of the norm,
+    the part across it that of the dip: u = (along / gate₁)² + (across / gate₂)².
+    """
+    k = 1.0 / (horizontal * horizontal + down * down)
+    e = (k * (h * horizontal + z * down) - 1.0) / norm_gate
+    c = k * (z * horizontal - h * down) / dip_gate
+    return e * e + c * c
+
+
+@inline
 def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> Any:
     """Departure u of the field from its reference, e⁻ᵘ, and the reference (horizontal, down, age) after this sample.
 
-    Of the sample's (horizontal, down) less the reference's, relative to the reference's size, the part along it is
-    the departure of the norm, the part across it that of the dip: u = (along / gate₁)² + (across / gate₂)², at most
-    60, and nothing in the first second. The reference is the mean of all samples so far, each with weight e⁻ᵘ,
-    forgotten with the time constant `window`.
+    u is that of `departure`, at most 60, and nothing in the first second. The reference is the mean of all samples so
+    far, each with weight e⁻ᵘ, forgotten with the time constant `window`.
     """
     norm_gate, dip_gate, window = gates
     horizontal, down, age = reference
@@ -42,10 +53,7 @@ def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> A
     square = horizontal * horizontal + down * down
     if square == 0.0:
         return 0.0, 1.0, (h, z, age)
-    k = 1.0 / square
-    e = (k * (h * horizontal + z * down) - 1.0) / norm_gate
-    c = k * (z * horizontal - h * down) / dip_gate
-    u = min(60.0, e * e + c * c) * min(1.0, max(0.0, age / LEARN - 1.0))
+    u = min(60.0, departure(norm_gate, dip_gate, horizontal, down, h, z)) * min(1.0, max(0.0, age / LEARN - 1.0))
     weight = math.exp(-u)
     k = weight * dt / min(age, window + dt)
     return u, weight, (horizontal + k * (h - horizontal), down + k * (z - down), age)

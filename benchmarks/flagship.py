@@ -1,0 +1,332 @@
+"""The calibrating filter against VQF: accuracy, ablations, coverage, cross-validation and time, in one run.
+
+    python benchmarks/flagship.py [--root DIR] [--part accuracy,ablation,coverage,time,cross-few,cross]
+                                  [--seconds 2400] [--json FILE]
+
+One set of parameters for everything. `cross` chooses the parameters anew for each trial that is left out, from the
+same start and on the other trials only, by coordinate steps on a grid of 1, 2, 5, 10, …; what is reported is the
+error on the trial that was left out. RepoIMU takes part in the choice as a guard. See README.md in this folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.spatial.transform import Rotation
+
+import _peers
+import _timing
+import northdown as nd
+from northdown.evaluation import AttitudeError
+
+CLIPPED = ("Test05", "Test10")
+# Some reference samples of these trials are plainly wrong (errors of up to 130° that every method shares).
+BAD_REFERENCE = ("Test03", "Test06")
+SPOILED = np.deg2rad(6.0)
+
+# From where `cross` starts, and what it may change: one significant digit each, by order of magnitude.
+START = {
+    "gyr_scale": 1e-4,
+    "gyr_bias_walk": 1e-4,
+    "acc_noise": 0.01,
+    "acc_motion": 1e-3,
+    "speed_noise": 0.1,
+    "speed_motion": 0.1,
+    "mag_noise": 0.02,
+    "norm_gate": 0.1,
+    "dip_gate": 0.05,
+    "gate_power": 2.0,
+    "field_window": 100.0,
+    "rest_noise": 2e-4,
+    "rest_offset": 1e-4,
+    "gyr_matrix": 1e-3,
+    "mag_delay_sigma": 0.01,
+}
+FEW = ("gyr_bias_walk", "mag_noise", "gate_power", "gyr_matrix", "mag_delay_sigma")
+"""The only ones that `cross-few` changes."""
+GUARD = 0.5
+"""Weight of RepoIMU's mean error beside BROAD's in the choice."""
+
+ABLATIONS = {
+    "as it is": {},
+    "no gyroscope matrix": {"gyr_matrix": 0.0},
+    "no magnetometer delay": {"mag_delay_sigma": 0.0},
+    "no magnetic gate": {"gate_power": 0.0},
+    "gate reference follows (10 s)": {"field_window": 10.0},
+    "no rest detection": {"rest_gyr": 0.0},
+    "no rest offset": {"rest_offset": 0.0},
+    "no growth with motion": {"acc_motion": 0.0, "speed_motion": 0.0},
+    "no growth with rate": {"gyr_scale": 0.0},
+}
+
+Method = Callable[[nd.Recording], nd.Orientation]
+console = Console(highlight=False, width=None if sys.stdout.isatty() else 170)
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """A recording, its group, and its true attitude in NED at the samples that count.
+
+    Where the rotations of the reference have to be found, `truth` has those that fit the smoothed estimate best.
+    """
+
+    name: str
+    recording: nd.Recording
+    group: str
+    index: np.ndarray
+    truth: np.ndarray
+
+    def error(self, estimate: nd.Orientation) -> AttitudeError:
+        """Error, aligned to this estimate; of trials with a spoiled reference without those samples."""
+        mask = None
+        if any(bad in self.name for bad in BAD_REFERENCE):
+            mask = np.zeros(len(estimate), bool)
+            mask[self.index] = True
+        return nd.attitude_error(estimate, self.recording, mask=mask)
+
+    def total(self, estimate: nd.Orientation) -> float:
+        """Total RMSE, degrees, of an estimate in NED by `truth`: quick, for searches."""
+        cosine = np.abs(np.einsum("ni,ni->n", estimate.quat[self.index], self.truth))
+        half = np.arccos(np.minimum(cosine, 1.0))
+        return float(np.rad2deg(2.0 * np.sqrt(np.mean(half * half))))
+
+
+def load(root: Path) -> list[Trial]:
+    recordings = []
+    for name in nd.datasets.names("broad", root):
+        group = "undisturbed" if "_undisturbed_" in name else "disturbed"
+        recordings.append((name, nd.datasets.broad(name, root), group))
+    for name in nd.datasets.names("repoimu", root):
+        if not any(c in name for c in CLIPPED):
+            recordings.append((name, nd.datasets.repoimu(int(name[11:13]), int(name[-1]), root), "RepoIMU"))
+    return [prepare(*r) for r in recordings]
+
+
+def prepare(name: str, recording: nd.Recording, group: str) -> Trial:
+    estimate = ours().smooth(recording, frame="NED")
+    error = nd.attitude_error(estimate, recording)
+    truth = Rotation.from_rotvec(-error.rotvec) * estimate.rotation[error.index]
+    keep = np.ones(len(error), bool)
+    if any(bad in name for bad in BAD_REFERENCE):
+        keep = error.total < SPOILED
+    return Trial(name, recording, group, error.index[keep], np.roll(truth.as_quat(), 1, axis=1)[keep])
+
+
+def ours(**parameters: float) -> nd.CalibratingEKF:
+    return nd.CalibratingEKF(**parameters)
+
+
+def methods() -> dict[str, Method]:
+    found: dict[str, Method] = {
+        "calibrating-ekf": lambda r: ours().run(r),
+        "calibrating-ekf, smoothed": lambda r: ours().smooth(r),
+        "mekf": lambda r: nd.MEKF().run(r),
+    }
+    vqf = _peers.find("vqf")
+    if vqf is None:
+        console.print(f"vqf: {_peers.INSTALL}")
+        return found
+
+    def orientation(r: nd.Recording, result: dict[str, np.ndarray]) -> nd.Orientation:
+        return nd.Orientation(r.time, result["quat9D"], "ENU")
+
+    found["vqf.VQF"] = lambda r: orientation(r, vqf.VQF(1.0 / r.rate).updateBatch(r.gyr, r.acc, r.mag))
+    found["vqf.offlineVQF"] = lambda r: orientation(r, vqf.offlineVQF(r.gyr, r.acc, r.mag, 1.0 / r.rate))
+    return found
+
+
+def figures(error: AttitudeError) -> tuple[float, float, float]:
+    e = error.rmse()
+    return e.total_deg, e.heading_deg, e.inclination_deg
+
+
+def means(trials: list[Trial], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Mean over the trials of each group; BROAD is both of its groups."""
+    group = np.array([t.group for t in trials])
+    chosen = {"BROAD": group != "RepoIMU", **{g: group == g for g in ("undisturbed", "disturbed", "RepoIMU")}}
+    return {name: values[mask].mean(axis=0) for name, mask in chosen.items() if mask.any()}
+
+
+def table(title: str, first: str, columns: list[str], rows: dict[str, list[str]]) -> None:
+    shown = Table(title=title, title_justify="left", title_style="bold")
+    shown.add_column(first)
+    for column in columns:
+        shown.add_column(column, justify="right")
+    for name, cells in rows.items():
+        shown.add_row(name, *cells)
+    console.print(shown)
+
+
+def accuracy(trials: list[Trial]) -> dict[str, object]:
+    results = {name: np.array([figures(t.error(m(t.recording))) for t in trials]) for name, m in methods().items()}
+    rows = {t.name: ["{:.2f} ({:.2f}, {:.2f})".format(*results[m][k]) for m in results] for k, t in enumerate(trials)}
+    for name in means(trials, np.zeros((len(trials), 3))):
+        rows[f"mean {name}"] = ["{:.3f} ({:.3f}, {:.3f})".format(*means(trials, v)[name]) for v in results.values()]
+    table("RMSE total (heading, inclination), degrees", "trial", list(results), rows)
+    return {m: {t.name: list(v[k]) for k, t in enumerate(trials)} for m, v in results.items()}
+
+
+def ablation(trials: list[Trial]) -> dict[str, object]:
+    rows, found = {}, {}
+    for name, changed in ABLATIONS.items():
+        filter_ = ours(**changed)
+        totals = np.array([_totals(filter_, t) for t in trials])
+        m = means(trials, totals)
+        rows[name] = [f"{m[g][0]:.2f} / {m[g][1]:.2f}" for g in m]
+        found[name] = {g: list(v) for g, v in m.items()}
+    table("Without one mechanism: mean total, real time / smoothed, degrees", "filter", list(m), rows)
+    return found
+
+
+def _totals(filter_: nd.CalibratingEKF, trial: Trial) -> tuple[float, float]:
+    """Total error, real time and smoothed; RepoIMU by the rotations found beforehand."""
+    r = trial.recording
+    return trial.total(filter_.run(r, frame="NED")), trial.total(filter_.smooth(r, frame="NED"))
+
+
+def coverage(trials: list[Trial]) -> dict[str, object]:
+    rows, found = {}, {}
+    for t in trials:
+        shares = []
+        for run in (ours().run, ours().smooth):
+            estimate = run(t.recording)
+            error = t.error(estimate)
+            sigma = np.sqrt(np.einsum("nii->ni", estimate.covariance[error.index]))
+            shares.append(100.0 * (np.abs(error.rotvec) < 3.0 * sigma).mean(axis=0))
+        rows[t.name] = [f"{s[0]:.1f}  {s[1]:.1f}  {s[2]:.1f}" for s in shares]
+        found[t.name] = [list(s) for s in shares]
+    table("Share of samples within 3σ, %: x, y (tilt), z (heading)", "trial", ["real time", "smoothed"], rows)
+    values = np.array(list(found.values()))
+    within = ((values >= 95.0) & (values <= 99.9)).sum(), (values < 95.0).sum(), (values > 99.9).sum()
+    console.print("of {} shares, {} from 95 to 99.9 %, {} below, {} above".format(values.size, *within))
+    return found
+
+
+def step(name: str, value: float, direction: int) -> float:
+    """Neighbour of a value on the grid 1, 2, 5, 10, …; of the exponent among whole numbers."""
+    if name == "gate_power":
+        return max(1.0, value + direction)
+    grid = [m * 10.0**e for e in range(-7, 5) for m in (1.0, 2.0, 5.0)]
+    stepped = grid[int(np.argmin(np.abs(np.log(np.array(grid) / value)))) + direction]
+    try:
+        ours(**{name: stepped})
+    except nd.InputError:  # beyond what the filter takes
+        return value
+    return stepped
+
+
+def cross(trials: list[Trial], seconds: float, names: tuple[str, ...]) -> dict[str, object]:
+    """Leave one trial of BROAD out, choose on the others, report on the one left out."""
+    known: dict[tuple[float, ...], np.ndarray] = {}
+    end = time.monotonic() + seconds
+    guard = np.array([t.group == "RepoIMU" for t in trials])
+
+    def errors(point: dict[str, float]) -> np.ndarray:
+        key = tuple(point.values())
+        if key not in known:
+            known[key] = np.array([_totals(ours(**point), t) for t in trials])
+        return known[key]
+
+    def cost(point: dict[str, float], out: int) -> float:
+        e = errors(point).sum(axis=1)
+        use = ~guard
+        use[out if out >= 0 else slice(0, 0)] = False
+        return float(e[use].mean() + (GUARD * e[guard].mean() if guard.any() else 0.0))
+
+    def descend(out: int) -> tuple[dict[str, float], bool]:
+        point, best, directions = dict(START), cost(START, out), dict.fromkeys(names, 1)
+        while True:
+            before = best
+            for name in names:
+                for direction in (directions[name], -directions[name]):
+                    if time.monotonic() > end:
+                        return point, False
+                    other = point | {name: step(name, point[name], direction)}
+                    if (c := cost(other, out)) < best - 1e-4:
+                        point, best, directions[name] = other, c, direction
+                        break
+            if best > before - 2e-3:
+                return point, True
+
+    rows, held = {}, []
+    everything, done = descend(-1)
+    console.print(f"chosen on all trials: { {n: everything[n] for n in names} }; {len(known)} sets tried")
+    for k in np.flatnonzero(~guard):
+        point, finished = descend(int(k))
+        done &= finished
+        held.append(errors(point)[k])
+        changed = ", ".join(f"{n} {v:g}" for n, v in point.items() if v != everything[n])
+        rows[trials[k].name] = [f"{held[-1][0]:.2f}", f"{held[-1][1]:.2f}", changed]
+    mean, tuned = np.mean(held, axis=0), errors(everything)[~guard].mean(axis=0)
+    rows["mean, left out"] = [f"{mean[0]:.3f}", f"{mean[1]:.3f}", ""]
+    rows["mean, chosen on all"] = [f"{tuned[0]:.3f}", f"{tuned[1]:.3f}", ""]
+    table("Left-out error, total, degrees", "left out", ["real time", "smoothed", "chosen otherwise"], rows)
+    if not done:
+        console.print("the time allowed ran out before the search was done: give --seconds")
+    return {"left out": list(mean), "chosen on all": list(tuned), "parameters": everything, "finished": done}
+
+
+def speed(trials: list[Trial]) -> dict[str, object]:
+    vqf = _peers.find("vqf")
+    if vqf is None:
+        return {}
+    r = max((t.recording for t in trials), key=len)
+    period = 1.0 / r.rate
+    cases = {
+        "run": lambda: ours().run(r),
+        "VQF": lambda: vqf.VQF(period).updateBatch(r.gyr, r.acc, r.mag),
+        "smooth": lambda: ours().smooth(r),
+        "offlineVQF": lambda: vqf.offlineVQF(r.gyr, r.acc, r.mag, period),
+    }
+    times = _timing.take_turns(cases, 9)
+    found = {
+        "run / VQF": _timing.ratio(times["run"], times["VQF"]),
+        "smooth / offlineVQF": _timing.ratio(times["smooth"], times["offlineVQF"]),
+    }
+    rows = {k: [f"{v:.2f}", bar] for (k, v), bar in zip(found.items(), ("2", "1.2"), strict=True)}
+    table(f"Time as a ratio, {len(r)} samples", "of", ["median", "bar"], rows)
+    return found
+
+
+def main() -> int:
+    """Run the parts asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--root", type=Path, default=os.environ.get("NORTHDOWN_DATA"), help="default: NORTHDOWN_DATA")
+    parser.add_argument("--part", default="accuracy,ablation,coverage,time,cross-few,cross", metavar="NAMES")
+    parser.add_argument("--seconds", type=float, default=2400.0, help="most time for each cross-validation")
+    parser.add_argument("--json", metavar="FILE", type=Path, help="also write the figures there")
+    options = parser.parse_args()
+    if options.root is None:
+        console.print("flagship: skipped, as there are no recordings; set NORTHDOWN_DATA or give --root")
+        return 0
+    parts = {
+        "accuracy": accuracy,
+        "ablation": ablation,
+        "coverage": coverage,
+        "cross": lambda trials: cross(trials, options.seconds, tuple(START)),
+        "cross-few": lambda trials: cross(trials, options.seconds, FEW),
+        "time": speed,
+    }
+    chosen = options.part.split(",")
+    if unknown := [p for p in chosen if p not in parts]:
+        console.print(f"flagship: expected parts out of {', '.join(parts)}, got {', '.join(unknown)}")
+        return 1
+    trials = load(options.root)
+    found = {part: parts[part](trials) for part in chosen}
+    if options.json:
+        options.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,183 @@
+"""The calibrating filter over a whole recording, keeping what its smoother needs on the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from northdown.estimators._calibrating_layout import (
+    CLOSED,
+    COV,
+    DENSITY,
+    ERROR,
+    GAINS,
+    GIVEN,
+    GYR_BIAS,
+    N_MOVE,
+    RATE,
+    REST_OFFSET,
+    TAKEN,
+    TURN,
+    N,
+)
+from northdown.kernels.jit import compiled, inline
+from northdown.kernels.quaternion import conjugate, multiply, rotate
+from northdown.kernels.rows import WIDTH
+from northdown.kernels.runner import (
+    MAX_GAP,
+    N_RUNNER,
+    NOT_FINITE,
+    OK,
+    PENDING,
+    TIME_BACKWARDS,
+    Kernel,
+    is_attitude,
+    make_tick,
+)
+from northdown.kernels.so3 import exp
+from northdown.kernels.stillness import kind_of_rest
+from northdown.kernels.tuples import to_fixed_tuple
+
+Array = npt.NDArray[np.float64]
+
+RATE_N: Final = 7
+"""Where the rate in navigation axes stands in the output on the way forth; on the way back the covariance does."""
+
+# What is kept of an epoch.
+END: Final = 0  # index of its last sample
+FRESH: Final = 1  # whether the attitude was found anew in it, so that nothing before bears on it
+BEFORE: Final = 2  # attitude before the measurements
+AFTER: Final = 6
+NOMINAL_BIAS: Final = 10
+MOVE: Final = 13  # Σ R dt, Σ R r dt, Σ R dt at rest, Σ R a dt
+MEASURED: Final = MOVE + N_MOVE  # 1/S and y/S of seven measurements, then the heading's slopes
+KEPT_GAINS: Final = MEASURED + 17
+KEPT_COV: Final = KEPT_GAINS + 7 * N  # rows of attitude and bias
+N_RECORD: Final = KEPT_COV + 6 * N
+
+
+_VECTOR: Any = numba.float64[::1]
+_ARRAY: Any = numba.float64[:, ::1]
+# A recording's arrays may be read-only.
+_TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)
+_ROWS: Any = numba.types.Array(numba.float64, 2, "C", readonly=True)
+
+
+def _make_forth(kernel: Kernel) -> Callable[..., Any]:
+    tick = make_tick(kernel)
+    output = kernel.output
+    n_params, n_out = kernel.n_params, kernel.n_out
+
+    def forth(
+        params: Array,
+        state: Array,
+        limit: float,
+        time: Array,
+        gyr: Array,
+        acc: Array,
+        mag: Array,
+        rate: Array,
+        out: Array,
+        flags: npt.NDArray[np.uint8],
+        records: Array,
+        jump: Array,
+    ) -> tuple[int, int, int]:
+        """Filter; returns code, samples done and epochs kept.
+
+        `rate` is that of `quiet_windows`. To `jump`, a quaternion, are added the rotations by which the attitude was
+        set from the sensors later than at the first sample.
+        """
+        p = to_fixed_tuple(params, n_params)
+        s = state[N_RUNNER:]
+        r = (state[PENDING], state[1], state[2], state[3], state[4], state[MAX_GAP])
+        epochs = 0
+        fresh = True
+        for i in range(len(time)):
+            dt = time[i] - time[i - 1] if i > 0 else 0.0
+            if dt < 0.0:
+                return TIME_BACKWARDS, i, epochs
+            mean = (rate[i, 0], rate[i, 1], rate[i, 2])
+            bias = (s[GYR_BIAS], s[GYR_BIAS + 1], s[GYR_BIAS + 2])
+            at_rest = (bias[0] + s[REST_OFFSET], bias[1] + s[REST_OFFSET + 1], bias[2] + s[REST_OFFSET + 2])
+            s[GIVEN] = kind_of_rest(mean, at_rest, limit)
+            s[DENSITY] = rate[i, 3]
+            pending = r[0]
+            q = (s[0], s[1], s[2], s[3])
+            code, flag, s, r = tick(
+                p,
+                s,
+                r,
+                dt,
+                (gyr[i, 0], gyr[i, 1], gyr[i, 2]),
+                (acc[i, 0], acc[i, 1], acc[i, 2]),
+                (mag[i, 0], mag[i, 1], mag[i, 2]),
+                (),
+            )
+            flags[i] = flag
+            if code != OK:
+                return code, i, epochs
+            if not is_attitude(s[0], s[1], s[2], s[3]):
+                return NOT_FINITE, i, epochs
+            o = output(p, s)
+            for j in range(4):
+                out[i, j] = s[j]
+            for j in range(4, n_out):
+                out[i, j] = o[j]
+            rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
+            for j in range(3):
+                out[i, RATE_N + j] = rate_n[j]
+            if r[0] != pending:
+                fresh = True
+                if i > 0:
+                    v = ((r[1] - bias[0]) * dt, (r[2] - bias[1]) * dt, (r[3] - bias[2]) * dt)
+                    turned = multiply((s[0], s[1], s[2], s[3]), conjugate(multiply(q, exp(v))))
+                    turned = multiply(turned, (jump[0], jump[1], jump[2], jump[3]))
+                    for j in range(4):
+                        jump[j] = turned[j]
+            if s[CLOSED] > 0.0 and r[0] == pending:
+                _keep(s, i, fresh, records[epochs])
+                epochs += 1
+                fresh = False
+        return OK, len(time), epochs
+
+    return forth
+
+
+@inline
+def _keep(s: Array, i: int, fresh: bool, row: Array) -> None:
+    """What the way back needs of the epoch that has just been closed."""
+    row[END] = float(i)
+    row[FRESH] = 1.0 if fresh else 0.0
+    after = (s[0], s[1], s[2], s[3])
+    before = multiply(exp((-s[ERROR], -s[ERROR + 1], -s[ERROR + 2])), after)
+    for j in range(4):
+        row[BEFORE + j] = before[j]
+        row[AFTER + j] = after[j]
+    for a in range(3):
+        row[NOMINAL_BIAS + a] = s[GYR_BIAS + a]
+    for j in range(N_MOVE):
+        row[MOVE + j] = s[TURN + j]
+    for j in range(17):
+        row[MEASURED + j] = s[TAKEN + j]
+    for k in range(7):
+        for j in range(N):
+            row[KEPT_GAINS + k * N + j] = s[GAINS + k * WIDTH + j]
+    for k in range(6):
+        for j in range(N):
+            row[KEPT_COV + k * N + j] = s[COV + k * WIDTH + j]
+
+
+@cache
+def forth(kernel: Kernel) -> Callable[..., tuple[int, int, int]]:
+    """Compiled ``forth(params, state, limit, time, gyr, acc, mag, rate, out, flags, records, jump)``."""
+    signature = (
+        *(_VECTOR, _VECTOR, numba.float64),
+        *(_TIMES, _ROWS, _ROWS, _ROWS),
+        *(_ARRAY, _ARRAY, numba.uint8[::1], _ARRAY, _VECTOR),
+    )
+    return compiled(_make_forth(kernel), f"{kernel.name}-forth", signature)

@@ -1,0 +1,114 @@
+"""Where the numbers of the calibrating filter stand in its state array, and in the vector of its errors."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from northdown.kernels.rows import WIDTH
+
+# Errors, in the order of the covariance's rows.
+N: Final = 22
+ATTITUDE, BIAS, VELOCITY, MATRIX, OFFSET, DELAY = 0, 3, 6, 9, 18, 21
+
+# Nominal values, from the head of the state array.
+QUAT: Final = 0
+GYR_BIAS: Final = 4
+SPEED: Final = 7
+GYR_MATRIX: Final = 10  # by columns
+REST_OFFSET: Final = 19
+MAG_DELAY: Final = 22
+
+# What is carried from sample to sample.
+MOTION: Final = 23  # mean square of linear acceleration
+AGE_ACC: Final = 24  # time since the sensor's last sample
+AGE_MAG: Final = 25
+FIELD: Final = 26  # reference: horizontal, down, age
+DEPARTURE: Final = 29
+STILL: Final = 30
+GIVEN: Final = 31  # kind of rest as found beforehand; negative where the filter finds it itself
+DENSITY: Final = 32  # spectral density of the gyroscope's noise in the window of rest
+CLOSED: Final = 33  # whether the last sample closed an epoch
+RATE: Final = 34  # angular rate, body axes
+NEW_FIELD: Final = 37  # another field: horizontal, down, for how long it has been seen
+
+# Sums over the samples of an epoch; all of them are cleared before the next.
+SUMS: Final = 40
+TIME: Final = 40
+TIME_ACC: Final = 41
+COUNT_MAG: Final = 42
+RATE_SQUARE: Final = 43
+ACC_SQUARE: Final = 44
+CLIPPED: Final = 45  # time in which the gyroscope was at the end of its range
+TURN: Final = 46  # Σ R dt by rows
+SCALED: Final = 55  # Σ R r_k dt in motion, three matrices by rows, one after the other
+REST_TURN: Final = 82  # Σ R dt at rest
+FORCE: Final = 91  # Σ R a dt
+N_MOVE: Final = 48  # numbers from TURN to FORCE
+SHIFT: Final = 94  # Σ (R a + g) dt
+FIELD_SUM: Final = 97
+FIELD_SLOPE: Final = 100  # its derivative with respect to the delay
+BLOCK: Final = 103  # the epoch's statistics, as `kernels.stillness` keeps them
+N_BLOCK: Final = 10
+SUMS_END: Final = BLOCK + N_BLOCK
+
+# Turns of the last moments, for the delayed attitude.
+CLOCK: Final = SUMS_END
+TURNED: Final = CLOCK + 1  # rotation vectors, summed up
+HEAD: Final = TURNED + 3
+RING: Final = HEAD + 1
+N_RING: Final = 32
+
+# Statistics of the last epochs.
+BLOCK_HEAD: Final = RING + 4 * N_RING
+BLOCKS: Final = BLOCK_HEAD + 1
+N_BLOCKS: Final = 64
+
+# Seven scalar measurements of an epoch: velocity, heading, rest. Of each 1/S (0: not taken) and y/S.
+TAKEN: Final = BLOCKS + N_BLOCKS * N_BLOCK
+HEADING_SLOPE: Final = TAKEN + 14  # derivatives of the heading with respect to tilt x, tilt y and delay
+GAINS: Final = -(-(HEADING_SLOPE + 3) // 8) * 8
+ERROR: Final = GAINS + 7 * WIDTH
+WORK: Final = ERROR + WIDTH
+COV: Final = WORK + 6 * WIDTH
+N_STATE: Final = COV + N * WIDTH
+
+
+class Terms(NamedTuple):
+    """The parameters as the kernel takes them: variances, spectral densities, times."""
+
+    gyr: float
+    scale: float
+    walk: float
+    velocity: float
+    velocity_motion: float
+    speed: float
+    speed_motion: float
+    motion_window: float
+    mag: float
+    norm_gate: float
+    dip_gate: float
+    gate_power: float
+    field_window: float
+    field_new: float
+    rest_gyr: float
+    rest_acc: float
+    rest_mean: float
+    rest_window: float
+    rest_speed: float
+    rest_bias: float
+    gyr_range: float
+    gyr_delay: float
+    gravity: float
+    epoch: float
+    calibration_time: float
+    matrix: float
+    offset: float
+    delay: float
+    start_delay: float
+    start_tilt: float
+    start_heading: float
+    start_bias: float
+    inflation: float
+    tilt_floor: float
+    heading_floor: float
+    time_floor: float

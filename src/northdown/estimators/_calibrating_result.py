@@ -1,0 +1,96 @@
+"""The start of the calibrating filter, and what it reports of a sample."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from northdown.estimators._calibrating_epoch import clear_sums
+from northdown.estimators._calibrating_layout import (
+    ATTITUDE,
+    BIAS,
+    COV,
+    DEPARTURE,
+    MAG_DELAY,
+    RATE,
+    STILL,
+    VELOCITY,
+    N,
+    Terms,
+)
+from northdown.kernels.jit import inline
+from northdown.kernels.kalman import symmetric3
+from northdown.kernels.quaternion import multiply, rotate
+from northdown.kernels.rows import WIDTH
+from northdown.kernels.so3 import exp
+from northdown.kernels.weighting import REJECTED
+from northdown.orientation import Flag
+
+_MAG_REJECTED = int(Flag.MAG_REJECTED)
+DIAGONAL: Final = WIDTH + 1
+"""From one diagonal entry of a covariance to the next."""
+START_SPEED: Final = 0.1  # m/s, standard deviation of the velocity that the first samples do not show
+
+
+@inline
+def covariance_of(t: Terms, p: Any, rate_n: Any) -> Any:
+    """Covariance that is reported, nine entries by rows, for that of the filter (upper triangle) and the rate."""
+    x, y, z = rate_n
+    k, f = t.inflation, t.time_floor
+    return symmetric3(
+        k * p[0] + t.tilt_floor + f * x * x,
+        k * p[1] + f * x * y,
+        k * p[2] + f * x * z,
+        k * p[3] + t.tilt_floor + f * y * y,
+        k * p[4] + f * y * z,
+        k * p[5] + t.heading_floor + f * z * z,
+    )
+
+
+@inline
+def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
+    """State for an attitude found from the sensors: its covariance starts anew, and so does the epoch."""
+    t = Terms(*p)
+    s[0], s[1], s[2], s[3] = q
+    for i in range(3):
+        for j in range(N):
+            s[COV + (ATTITUDE + i) * WIDTH + j] = 0.0
+            s[COV + j * WIDTH + ATTITUDE + i] = 0.0
+            s[COV + (VELOCITY + i) * WIDTH + j] = 0.0
+            s[COV + j * WIDTH + VELOCITY + i] = 0.0
+        s[COV + (VELOCITY + i) * DIAGONAL] = START_SPEED * START_SPEED
+    s[COV] = t.start_tilt
+    s[COV + DIAGONAL] = t.start_tilt
+    s[COV + 2 * DIAGONAL] = t.start_heading if heading_known else math.pi * math.pi / 3.0
+    clear_sums(s)
+    return s
+
+
+@inline
+def ahead(t: Terms, q: Any, rate_n: Any) -> Any:
+    """Attitude at the time of the sample, by which the gyroscope is late."""
+    if t.gyr_delay == 0.0:
+        return q
+    d = t.gyr_delay
+    return multiply(exp((d * rate_n[0], d * rate_n[1], d * rate_n[2])), q)
+
+
+@inline
+def output(p: Any, s: Any) -> Any:
+    """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u, delay, stillness."""
+    t = Terms(*p)
+    row = COV + WIDTH
+    p_upper = (s[COV], s[COV + 1], s[COV + 2], s[row + 1], s[row + 2], s[row + WIDTH + 2])
+    rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
+    covariance = covariance_of(t, p_upper, rate_n)
+    at = COV + BIAS * DIAGONAL
+    sigma = (math.sqrt(s[at]), math.sqrt(s[at + DIAGONAL]), math.sqrt(s[at + 2 * DIAGONAL]))
+    q = ahead(t, (s[0], s[1], s[2], s[3]), rate_n)
+    nominal = q + (s[4], s[5], s[6])
+    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL])
+
+
+@inline
+def flagged(p: Any, s: Any) -> int:
+    """Whether the field of the last epoch was all but rejected."""
+    return _MAG_REJECTED if s[DEPARTURE] > REJECTED else 0
