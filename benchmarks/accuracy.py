@@ -38,10 +38,15 @@ console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 
 
 def estimators(names: str | None) -> dict[str, Method]:
-    """Northdown's own, with their defaults."""
-    known = nd.estimators.registry()
+    """Northdown's own that work with gyroscopes, with their defaults; and their smoothers, where there are any."""
+    known = {name: chosen for name, chosen in nd.estimators.registry().items() if "array" not in chosen.needs}
     chosen = list(known) if names is None else [nd.estimators.get(n.strip()).name for n in names.split(",")]
-    return {name: (lambda recording, name=name: known[name]().run(recording)) for name in chosen}
+    methods: dict[str, Method] = {}
+    for name in chosen:
+        methods[name] = lambda recording, name=name: known[name]().run(recording)
+        if known[name].smooths:
+            methods[f"{name}, offline"] = lambda recording, name=name: known[name]().smooth(recording)
+    return methods
 
 
 def mahony_as_published(recording: nd.Recording) -> nd.Orientation:
@@ -115,16 +120,12 @@ def groups(data: str, trials: Iterable[str]) -> dict[str, list[str]]:
 
 
 def show_trials(results: dict[str, dict[str, Figures]], trials: list[str]) -> None:
-    table = Table(title="RMSE total (heading, inclination), degrees", title_justify="left", title_style="bold")
-    table.add_column("trial")
-    for method in results:
-        table.add_column(method.replace(" (", "\n(").replace(" from ", "\nfrom "), justify="right")
+    table = Table(title="RMSE total, degrees", title_justify="left", title_style="bold")
+    table.add_column("method")
     for trial in trials:
-        cells = []
-        for figures in results.values():
-            f = figures.get(trial)
-            cells.append(f"{f['total']:.2f}\n({f['heading']:.2f}, {f['inclination']:.2f})" if f else "–")
-        table.add_row(trial.replace("undisturbed", "und.").replace("disturbed", "dist."), *cells)
+        table.add_column(trial.partition("_")[0] if trial[:2].isdigit() else trial, justify="right")
+    for method, figures in results.items():
+        table.add_row(method, *(f"{figures[t]['total']:.2f}" if t in figures else "–" for t in trials))
     console.print(table)
 
 
