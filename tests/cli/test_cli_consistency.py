@@ -53,7 +53,7 @@ def test_runs_json_agrees_with_the_library(run):
     assert len(value["bias_mean_square"]) == 3
 
 
-@pytest.mark.parametrize("name", ["mekf", "euler-ukf"])
+@pytest.mark.parametrize("name", ["mekf", "euler-ukf", "gyro-free-direct"])
 def test_runs_table(run, tmp_path, name):
     figure = tmp_path / "runs.svg"
     result = run("consistency", "--runs", "3", "-e", name, "--plot", figure)

@@ -136,7 +136,7 @@ def test_against_dense(count):
     assert (result.rotation[-1] * dense.R.inv()).magnitude() < 1e-9
     assert np.abs(result.rate[-1] - dense.rate).max() < 1e-8
     assert np.abs(result.covariance[-1] - dense.P[:3, :3]).max() < 1e-6 * np.diag(dense.P)[:3].min()
-    assert result.diagnostics["linear_acceleration"][-1] == pytest.approx(math.sqrt(dense.motion), rel=1e-6)
+    assert result.diagnostics["acceleration"][-1] == pytest.approx(math.sqrt(dense.motion), rel=1e-6)
 
 
 def test_redundant_combinations_see_products_of_rates_alone():

@@ -104,14 +104,17 @@ class Dense:
 
         by_rate is how z, less what rates leak into it, depends on the rate, where that is not to be differentiated.
         """
-        x, P = np.zeros(6), self.P
+        x, P, y = np.zeros(6), self.P, None
         for _ in range(self.f.iterations):
             H = -jacobian(residual, x)
             if by_rate is not None:
                 H[:, 3:] = by_rate
-            K = P @ H.T @ np.linalg.inv(H @ P @ H.T + noise)
-            x = K @ (residual(x) + H @ x)
+            S = H @ P @ H.T + noise
+            K = P @ H.T @ np.linalg.inv(S)
+            y = residual(x) + H @ x
+            x = K @ y
             self.P = (np.eye(6) - K @ H) @ P
+        self.nis = y @ np.linalg.solve(S, y)
         self.R, self.w = Rotation.from_rotvec(x[:3]) * self.R, self.w + x[3:]
 
     def at(self, x):
@@ -224,16 +227,16 @@ def run_dense(kind, f, recording, start):
 
 
 CASES = {
-    "direct": (DenseDirect, "scattered", nd.GyroFreeDirect(dip=1.0)),
-    "direct iterated": (DenseDirect, "scattered", nd.GyroFreeDirect(dip=1.0, iterations=3)),
+    "direct": (DenseDirect, "scattered", nd.GyroFreeDirect(motion_time=0.0, dip=1.0)),
+    "direct iterated": (DenseDirect, "scattered", nd.GyroFreeDirect(motion_time=0.0, dip=1.0, iterations=3)),
     "direct K06": (
         DenseDirect,
         "coplanar",
-        nd.GyroFreeDirect(dip=1.0, force_axes="yz", mag_axes="xy", iterations=2),
+        nd.GyroFreeDirect(motion_time=0.0, dip=1.0, force_axes="yz", mag_axes="xy", iterations=2),
     ),
-    "indirect": (DenseIndirect, "scattered", nd.GyroFreeIndirect()),
-    "indirect iterated": (DenseIndirect, "cube", nd.GyroFreeIndirect(iterations=3)),
-    "indirect K06": (DenseIndirect, "cube", nd.GyroFreeIndirect(residual="tangent", iterations=2)),
+    "indirect": (DenseIndirect, "scattered", nd.GyroFreeIndirect(motion_time=0.0)),
+    "indirect iterated": (DenseIndirect, "cube", nd.GyroFreeIndirect(motion_time=0.0, iterations=3)),
+    "indirect K06": (DenseIndirect, "cube", nd.GyroFreeIndirect(motion_time=0.0, residual="tangent", iterations=2)),
 }
 
 
@@ -249,12 +252,13 @@ def test_against_dense(recordings, case):
     assert np.abs(result.covariance[-1] - dense.P[:3, :3]).max() < 1e-7 * np.diag(dense.P)[:3].min()
     half = 0.25 * (r.time[-1] - r.time[-2]) * np.diag(dense.rate_noise)
     assert np.abs(result.rate_sigma[-1] / np.sqrt(np.diag(dense.P)[3:] + half) - 1.0).max() < 1e-7
+    assert result.diagnostics["nis"][-1] == pytest.approx(dense.nis, rel=1e-5)
 
 
 def test_correlated_noise_as_in_the_riccati_equation_with_cross_term():
     """At rest, with rates below what their products show, the filter's covariance is the equation's solution."""
     array, dt = scattered(7, seed=2), 1.0 / RATE
-    f = nd.GyroFreeDirect(dip=1.0, mag_noise=0.02)
+    f = nd.GyroFreeDirect(motion_time=0.0, dip=1.0, mag_noise=0.02)
     n = 2000
     R = Rotation.from_euler("ZYX", [0.4, 0.3, -0.5])
     y = np.tile(array.matrix[:, 3:] @ R.inv().apply([0.0, 0.0, -GRAVITY]), (n, 1))

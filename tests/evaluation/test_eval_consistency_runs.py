@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from northdown.arrays import ring
 from northdown.errors import InputError
 from northdown.estimators import get
 from northdown.evaluation import Conditions, chi2_bounds, monte_carlo, nees
@@ -40,6 +41,52 @@ def test_covariance_holds(name):
     inside = (found.mean_nis > found.nis_time_bounds[0]) & (found.mean_nis < found.nis_time_bounds[1])
     # 3000 independent times, so that 95 % is known to 0.4 %; the first has no measurement
     assert np.mean(inside[1:]) == pytest.approx(0.95, abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["gyro-free-direct", "gyro-free-indirect", "gyro-free-mekf"])
+def test_covariance_of_filters_without_gyroscope_holds(name):
+    # at rest or turning slowly for the indirect one, which does not measure pitch near 90°
+    conditions = Conditions(duration=8.0, rate=50.0, turn=0.15 if name == "gyro-free-indirect" else 0.6)
+    found = monte_carlo(get(name), RUNS, seed=2, conditions=conditions)
+    assert abs(found.factor - 1.0) < 0.03, found
+    assert found.interval[0] < 3.05
+    assert found.interval[1] > 2.95
+    # 60 runs of some 15 independent times: as in `test_covariance_holds`
+    assert np.abs(found.share[0] - 0.683).max() < 0.04
+    assert np.abs(found.rms_error / found.rms_sigma - 1.0).max() < 0.08
+    if name == "gyro-free-mekf":
+        # one of six measurements, the redundant one, has the bias counted as as much noise again as its own
+        assert 0.88 < found.anis < 0.96
+    else:
+        # 24 000 times of four to five measurements know it to 0.4 %
+        assert found.anis == pytest.approx(1.0, abs=0.012)
+
+
+def test_wrong_noise_of_an_array_is_found_out():
+    sure = monte_carlo(get("gyro-free-direct"), 20, conditions=SHORT, parameters={"acc_noise": 0.0012})
+    assert sure.factor > 1.3
+    assert sure.anis > 2.0
+    shy = monte_carlo(get("gyro-free-direct"), 20, conditions=SHORT, parameters={"acc_noise": 0.02})
+    assert shy.factor < 0.8
+    assert shy.anis < 0.6
+
+
+def test_array_of_the_conditions_is_the_one_that_is_used():
+    array = ring(8, 0.2)
+    conditions = Conditions(duration=4.0, rate=50.0, array=array)
+    recording, _ = conditions.draw(1, bias=False, array=True)
+    assert recording.array is array
+    assert conditions.configured(get("gyro-free-mekf")).array is array
+    plain, _ = SHORT.draw(1, bias=False)
+    beside, _ = SHORT.draw(1, bias=False, array=True)
+    assert plain.array is None
+    # 50 mm of K06's seven, beside sensors that do not change by it
+    assert np.allclose(np.linalg.norm(beside.array.position, axis=1), 0.05)
+    assert np.array_equal(beside.gyr, plain.gyr)
+    assert np.array_equal(beside.mag, plain.mag)
+    # four times the size, a quarter of the noise of angular acceleration: better rates, and so better angles
+    small, large = (monte_carlo(get("gyro-free-direct"), 5, conditions=c) for c in (SHORT, conditions))
+    assert (large.rms_sigma < small.rms_sigma).all()
 
 
 def test_a_single_time_of_many_runs_is_chi_square():
@@ -167,6 +214,8 @@ def test_mistakes_are_one_line():
         lambda: monte_carlo(get("mekf"), 3, parameters={"kp": 1.0}),
         lambda: Conditions(acc_noise=0.0),
         lambda: Conditions(dip=2.0),
+        lambda: Conditions(array=0.05),
+        lambda: Conditions(array_noise=0.0),
         lambda: Conditions(rate=math.nan),
     ):
         with pytest.raises(InputError) as caught:

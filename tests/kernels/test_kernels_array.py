@@ -132,9 +132,10 @@ def test_twelve_states_in_blocks(seed):
     )
     assert np.abs(np.concatenate(seen) - P @ h).max() < SAME * np.abs(P).max()
     s = h @ P @ h + r
-    after, x = blocks.gain(p, tuple(tuple(v) for v in d.reshape(4, 3)), seen, s, y)
+    after, x = blocks.gain(p, (*map(tuple, d.reshape(4, 3)), 2.0), seen, s, y)
     assert np.abs(whole12(after) - (P - np.outer(P @ h, P @ h) / s)).max() < SAME * np.abs(P).max()
-    assert np.abs(np.concatenate(x) - (d + P @ h * y / s)).max() < SAME * np.abs(P).max()
+    assert np.abs(np.concatenate(x[:4]) - (d + P @ h * y / s)).max() < SAME * np.abs(P).max()
+    assert x[4] == pytest.approx(2.0 + y * y / s, rel=1e-12)
 
 
 @few

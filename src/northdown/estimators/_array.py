@@ -1,18 +1,25 @@
 r"""How the K channels of an accelerometer array become six numbers a sample, and with which noise.
 
 With y = J (ω̇, f) + P p(ω) + n, p the products of rates, and white noise n of equal size in all channels, the least
-squares solution is linear in y. Two forms are used, J₁ and J₂ being the columns of J that belong to ω̇ and f:
+squares solution is linear in y:
 
-.. math::  f_m = (J^+ y)_{4:6}, \qquad  \alpha_m = (J^+ y)_{1:3} - G f_m, \qquad
-           G = E[n_\alpha n_f^T]\, E[n_f n_f^T]^{-1}
+.. math::
 
-so that
+    \begin{pmatrix} \alpha_m \\ f_m \end{pmatrix} = J^+ y, \qquad
+    \alpha_m = \dot\omega + L_\alpha p(\omega) + n_\alpha, \quad f_m = f + L_f\, p(\omega) + n_f + a
 
-.. math::  \dot\omega = \alpha_m - L_\alpha p(\omega) + G f - \tilde n, \qquad f_m = f + L_f p(\omega) + n_f
+with C = E[n nᵀ] = J⁺ J⁺ᵀ, f what the model says of the specific force, −g down, and linear acceleration a: left out
+(s = 0), or taken for noise of variance s in each component. A filter's process noise n_α and its measurement noise
+n_f come from the same channels. Exact treatment of their correlation: what the residual tells of n_α is taken off,
 
-where f is what the model says of the specific force, −g down. Noises ñ and n_f are uncorrelated: the filter's process
-noise and its measurement noise come from the same channels, and this is the exact treatment of their correlation. (If
-all three components of f are used, α_m is (J₁ᵀJ₁)⁻¹J₁ᵀy and G the same of J₂.)
+.. math::
+
+    \dot\omega = \alpha_m - L_\alpha p(\omega) - G\, (f_m - L_f\, p(\omega) - f) - \tilde n, \qquad
+    G = C_{\alpha f} (C_{ff} + s)^{-1} = C_{\alpha f} V (\Lambda + s)^{-1} V^T
+
+with C_ff = V Λ Vᵀ, and ñ is not correlated with n_f + a any more. Where gravity is distrusted, s large, nothing is
+taken off. (With s = 0 and all three components of f, α_m − G f_m is (J₁ᵀJ₁)⁻¹J₁ᵀy, J₁ being the columns of J that
+belong to ω̇.)
 """
 
 from __future__ import annotations
@@ -36,29 +43,39 @@ class Reduction:
     Parameters
     ----------
     matrix : (6, K) array
-        Gives (α_m, f_m) from the channels: rad/s², m/s².
+        J⁺: gives (α_m, f_m) from the channels, rad/s² and m/s².
     products : (6, 6) array
         L: what of (α_m, f_m) comes from ωx², ωy², ωz², ωxωy, ωxωz, ωyωz.
-    coupling : (3, 3) array
-        G, rad/s² for m/s².
-    rate_noise : (3, 3) array
-        Covariance of ñ for channels of variance 1.
-    force_noise : (3, 3) array
-        Covariance of n_f for channels of variance 1.
+    noise : (6, 6) array
+        C: covariance of the noise of (α_m, f_m) for channels of variance 1.
     extra : (n, K) array
         Gives further combinations, of filters that take them; see `redundancy`.
     """
 
     matrix: FloatArray
     products: FloatArray
-    coupling: FloatArray
-    rate_noise: FloatArray
-    force_noise: FloatArray
+    noise: FloatArray
     extra: FloatArray
 
+    def block(self, axes: str = "xyz") -> list[float]:
+        """What kernels take, `_array_coupling`, when the components `axes` of f are measurements."""
+        used = ["xyz".index(axis) for axis in axes]
+        values, vectors = np.ones(3), np.zeros((3, 3))
+        there = np.ix_(used, range(len(used)))
+        values[: len(used)], vectors[there] = np.linalg.eigh(self.noise[3:, 3:][np.ix_(used, used)])
+        upper = np.triu_indices(3)
+        return [
+            *self.products.ravel(),
+            *self.noise[:3, :3][upper],
+            *(self.noise[:3, 3:] @ vectors).ravel(),
+            *vectors.ravel(),
+            *values,
+            *self.noise[3:, 3:][upper],
+        ]
 
-def reduce_array(array: AccelerometerArray, axes: str = "xyz") -> Reduction:
-    """The reduction of an array, when the components `axes` of f are measurements of the filter.
+
+def reduce_array(array: AccelerometerArray) -> Reduction:
+    """The reduction of an array.
 
     Raises
     ------
@@ -66,15 +83,7 @@ def reduce_array(array: AccelerometerArray, axes: str = "xyz") -> Reduction:
         When the array has fewer than six accelerometers, or cannot tell ω̇ and f apart.
     """
     matrix = solution(array)
-    noise = matrix @ matrix.T
-    coupling = np.zeros((3, 3))
-    used = [3 + "xyz".index(axis) for axis in axes]
-    if used:
-        coupling[:, [k - 3 for k in used]] = np.linalg.solve(noise[np.ix_(used, used)], noise[:3, used].T).T
-    matrix = np.vstack([matrix[:3] - coupling @ matrix[3:], matrix[3:]])
-    noise = matrix @ matrix.T
-    none = np.zeros((0, len(array)))
-    return Reduction(matrix, matrix @ array.products, coupling, noise[:3, :3], noise[3:, 3:], none)
+    return Reduction(matrix, matrix @ array.products, matrix @ matrix.T, np.zeros((0, len(array))))
 
 
 def channels(array: AccelerometerArray | None, samples: FloatArray, name: str) -> FloatArray:
@@ -86,14 +95,6 @@ def channels(array: AccelerometerArray | None, samples: FloatArray, name: str) -
             expected(f"{count} channels of the array for {name}", got, do="give the array they belong to")
         )
     return samples
-
-
-def selected_whitening(noise: FloatArray, axes: str) -> FloatArray:
-    """A (3, 3) with A C Aᵀ = 1 for the components `axes` of a covariance C; its rows of the others are zero."""
-    used = np.ix_(*[["xyz".index(axis) for axis in axes]] * 2)
-    result = np.zeros((3, 3))
-    result[used] = np.linalg.inv(np.linalg.cholesky(noise[used]))
-    return result
 
 
 def redundancy(array: AccelerometerArray) -> tuple[FloatArray, FloatArray]:

@@ -54,6 +54,11 @@ class GyroFreeFilter(Estimator):
     start_rate : float
         Standard deviation of the angular rate at the start, which is taken for zero, rad/s. Raising it learns a rate
         faster at first.
+
+    Notes
+    -----
+    `Orientation.diagnostics` has ``acceleration``, rms of linear acceleration over `motion_window`, m/s²; ``nis`` and
+    ``nis_dof``, normalised innovation squared of the sample and of how many scalar measurements, as `KalmanFilter`.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("array",)
@@ -96,17 +101,13 @@ class GyroFreeFilter(Estimator):
         InputError
             Without an array, or with one that cannot do.
         """
-        return reduce_array(self._geometry(), self._force_axes())
+        return reduce_array(self._geometry())
 
     def _geometry(self) -> AccelerometerArray:
         if self.array is None:
             do = f"give {type(self).__name__}(array=…)"
             raise InputError(expected("the geometry of an accelerometer array", "none", do=do))
         return self.array
-
-    def _force_axes(self) -> str:
-        """Components of specific force that the filter measures."""
-        return "xyz"
 
     def samples(self, recording: Recording) -> Samples:
         if recording.array_acc is None:

@@ -4,13 +4,14 @@ Parameter tuple p: channels' noise density squared, bias walk squared, start bia
 noise density squared 0–4; norm gate, dip gate, field window 5–7; motion time, motion window 8–9; variance density of
 a redundant combination 10; cosine and sine of the dip (NaN: learned) 11–12; L_α 13–30, L_f 31–48; C_αα (triangle)
 49–54, C_αf V 55–63, V 64–72, Λ 73–75, C_ff (triangle) 76–81; B 82–117; variances of tilt, heading and rate at the
-start 118–120. The state tuple s is described at `gyro_free_mekf.step`.
+start 118–120. 13–81 are the tuple of `_array_coupling`. The state tuple s is described at `gyro_free_mekf.step`.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from northdown.estimators._array_coupling import coupling, force_axis, force_products, force_variance, turning_slope
 from northdown.kernels.block_kalman import (
     blocks,
     change_rate,
@@ -29,50 +30,9 @@ from northdown.kernels.block_kalman import (
 )
 from northdown.kernels.jit import inline
 from northdown.kernels.kalman import symmetric3
-from northdown.kernels.quaternion import add, dot, down_b, multiply, normalize, scale
-from northdown.kernels.rate_kalman import matrix_nb, product_slope, products, products_slope, times3
+from northdown.kernels.quaternion import add, dot, multiply, normalize, scale
+from northdown.kernels.rate_kalman import matrix_nb, product_slope, products_slope, times3
 from northdown.kernels.so3 import exp
-
-
-@inline
-def subtract(a: Any, b: Any) -> Any:
-    """Difference of two vectors."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@inline
-def coupling(p: Any, loose: float) -> Any:
-    """G, and the six entries of the covariance of ω̇'s noise that it leaves, for channels of variance 1."""
-    cav, axes = p[55:64], p[64:73]
-    k = (1.0 / (p[73] + loose), 1.0 / (p[74] + loose), 1.0 / (p[75] + loose))
-    scaled = (
-        cav[0] * k[0],
-        cav[1] * k[1],
-        cav[2] * k[2],
-        cav[3] * k[0],
-        cav[4] * k[1],
-        cav[5] * k[2],
-        cav[6] * k[0],
-        cav[7] * k[1],
-        cav[8] * k[2],
-    )
-    lost = product(scaled, transposed(cav))
-    c = p[49:55]
-    left = (c[0] - lost[0], c[1] - lost[1], c[2] - lost[2], c[3] - lost[4], c[4] - lost[5], c[5] - lost[8])
-    return product(scaled, transposed(axes)), left
-
-
-@inline
-def force_residual(p: Any, q: Any, rate: Any, force: Any, bias: Any) -> Any:
-    """Specific force less what attitude, rate and bias explain."""
-    return add(subtract(subtract(force, bias), products(p[31:49], rate)), scale(p[3], down_b(q)))
-
-
-@inline
-def turning(p: Any, q: Any, rate: Any, alpha: Any, force: Any, biases: Any, g: Any) -> Any:
-    """Angular acceleration at a rate."""
-    known = subtract(subtract(alpha, biases[0]), products(p[13:31], rate))
-    return subtract(known, times3(g, force_residual(p, q, rate, force, biases[1])))
 
 
 @inline
@@ -82,11 +42,9 @@ def predict(p: Any, s: Any, dt: float) -> Any:
     acceleration, rate, fresh, before = (s[91], s[92], s[93]), (s[94], s[95], s[96]), s[97], s[98]
     h = 0.5 * (before + dt)
     u = h * fresh
-    g, noise = coupling(p, s[99])
+    g, noise = coupling(p[13:82], s[99])
     m = matrix_nb(q)
-    at = products_slope(p[13:31], rate)
-    leak = products_slope(p[31:49], rate)
-    slope = total(at[0] + at[1] + at[2], times(-1.0, product(g, leak[0] + leak[1] + leak[2])))
+    slope = turning_slope(p[13:82], rate, g)
     x, y = scale(-u * p[3], times3(g, m[1])), scale(u * p[3], times3(g, m[0]))
     by_rate = (
         1.0 - u * slope[0],
@@ -124,7 +82,8 @@ def predict(p: Any, s: Any, dt: float) -> Any:
 
 @inline
 def correct_extra(p: Any, cov: Any, d: Any, rate: Any, extra: Any, r: float) -> Any:
-    """Scalar updates with the combinations that see products of rates only."""
+    """Scalar updates with the combinations that see products of rates only; returns how many, too."""
+    dof = 0.0
     for i in range(6):
         b = p[82:118]
         row = (b[6 * i], b[6 * i + 1], b[6 * i + 2], b[6 * i + 3], b[6 * i + 4], b[6 * i + 5])
@@ -139,7 +98,8 @@ def correct_extra(p: Any, cov: Any, d: Any, rate: Any, extra: Any, r: float) -> 
             # the form itself is half its slope times the rate
             residual = extra[i] - 0.5 * (h[0] * x + h[1] * y + h[2] * z) - mean
             cov, d = gain(cov, d, ph, dot(h, ph[1]) + 2.0 * square + r, residual)
-    return cov, d
+            dof += 1.0
+    return cov, d, dof
 
 
 @inline
@@ -157,13 +117,12 @@ def correct_field(cov: Any, d: Any, y: Any, north: float, down: float, r: float)
 def correct_force(p: Any, cov: Any, d: Any, q: Any, rate: Any, y: Any, loose: float, per: float) -> Any:
     """Three scalar updates in the axes in which noise is diagonal; y is the residual at d = 0."""
     m = matrix_nb(q)
-    leak = products_slope(p[31:49], rate)
-    v = p[64:73]
+    leak = products_slope(force_products(p[13:82]), rate)
     for i in range(3):
-        a = (v[i], v[3 + i], v[6 + i])
+        a = force_axis(p[13:82], i)
         ht = (-p[3] * dot(a, m[1]), p[3] * dot(a, m[0]), 0.0)
         hw = add(scale(a[0], leak[0]), add(scale(a[1], leak[1]), scale(a[2], leak[2])))
         ph = joined(joined(seen_attitude(cov, ht), seen_rate(cov, hw)), seen_force_bias(cov, a))
-        s = dot(ht, ph[0]) + dot(hw, ph[1]) + dot(a, ph[3]) + per * (p[73 + i] + loose)
+        s = dot(ht, ph[0]) + dot(hw, ph[1]) + dot(a, ph[3]) + per * (force_variance(p[13:82], i) + loose)
         cov, d = gain(cov, d, ph, s, dot(a, y) - dot(ht, d[0]) - dot(hw, d[1]) - dot(a, d[3]))
     return cov, d

@@ -10,15 +10,16 @@ prediction). Measured, in body axes, are the specific force and the field's dire
                                    R_{nb}^T (\cos D, 0, \sin D)^T \end{pmatrix}
 
 with the dip D and the size B of the local field. No angle occurs, so that no attitude is singular. The noise of f_m
-comes from the channels' through the least squares solution of the array; it is full, and made white by a triangular
-matrix, after which each row is a scalar update.
+comes from the channels' through the least squares solution of the array (`_array`). Its covariance is full; in the
+axes in which it is diagonal each component is a scalar update.
 
 Source: C.-F. Kao, M.S. thesis, National Chiao Tung University, 2006 (K06), (3.1) to (3.8), (3.19) to (3.28).
 
 Deviations. The iterated update is :math:`x_{i+1} = x^- + K_i (z - h(x_i) - H_i (x^- - x_i))`, which is (3.7) with the
 inverses that its print lacks; (3.6) is P − P Hᵀ(H P Hᵀ + R)⁻¹ H P; the centripetal terms of (3.25) are subtracted.
 Process and measurement noise come from the same accelerometers; their correlation, which K06 leaves out, is treated
-exactly (`_array`). The attitude's error has three states, not four.
+exactly (`_array`). The attitude's error has three states, not four. The
+covariance that is given allows for linear acceleration (`_gyro_free`); that of ``motion_time=0`` is K06's.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ import numpy as np
 
 from northdown._validation import FloatArray
 from northdown.errors import InputError, expected
-from northdown.estimators._array import Reduction, selected_whitening
+from northdown.estimators._array import Reduction
+from northdown.estimators._array_coupling import force_axis, force_products, force_variance
 from northdown.estimators._array_filter import Reduced
 from northdown.estimators._gyro_free import (
     N_COMMON,
@@ -40,11 +42,12 @@ from northdown.estimators._gyro_free import (
     N_STATE,
     GyroFreeKalman,
     aligned,
+    block,
     corrected,
     finished,
     flagged,
-    force_products,
     learn_field,
+    moving,
     output,
     own,
     predict,
@@ -63,7 +66,6 @@ from northdown.kernels.rate_kalman import (
     matrix_nb,
     products,
     products_slope,
-    times3,
 )
 from northdown.kernels.runner import Kernel
 
@@ -74,9 +76,8 @@ _WELL_PLACED = 0.5
 
 
 @inline
-def force_row(i: int, white: Any, m: Any, slope: Any, g: float) -> Any:
-    """Row of the derivative of the whitened specific force by (δ, ω), before `from_prior`."""
-    a = (white[3 * i], white[3 * i + 1], white[3 * i + 2])
+def force_row(a: Any, m: Any, slope: Any, g: float) -> Any:
+    """Derivative of the specific force along a by (δ, ω), before `from_prior`."""
     north, east = dot(a, m[0]), dot(a, m[1])
     x = a[0] * slope[0][0] + a[1] * slope[1][0] + a[2] * slope[2][0]
     y = a[0] * slope[0][1] + a[1] * slope[1][1] + a[2] * slope[2][1]
@@ -85,19 +86,22 @@ def force_row(i: int, white: Any, m: Any, slope: Any, g: float) -> Any:
 
 
 @inline
-def correct_force(p: Any, cov: Any, d: Any, at: Any, y: Any, m: Any, slope: Any, r: float) -> Any:
-    """Update with the specific force less the expected at the point `at`, each component of variance r when white."""
-    white = own(p)[:9]
-    y = times3(white, y)
-    point = (at[0], at[1], at[2])
+def correct_force(p: Any, cov: Any, d: Any, at: Any, y: Any, m: Any, slope: Any, per: float) -> Any:
+    """Update with the specific force less the expected at the point `at`, in the axes in which its noise is diagonal.
+
+    A channel's noise has the variance per. Returns (P, correction, number of scalar updates).
+    """
+    point, dof = (at[0], at[1], at[2]), 0.0
     for i in range(3):
-        if white[4 * i] != 0.0:
-            angle, rate = force_row(i, white, m, slope, p[2])
+        a = force_axis(block(p), i)
+        if dot(a, a) > 0.0:
+            angle, rate = force_row(a, m, slope, p[2])
             angle = from_prior(angle, point)
             h = angle + rate
-            z = y[i] + dot(angle, point) + dot(rate, (at[3], at[4], at[5]))
-            cov, d = correct_row(cov, d, h, z, r)
-    return cov, d
+            z = dot(a, y) + dot(angle, point) + dot(rate, (at[3], at[4], at[5]))
+            cov, d = correct_row(cov, d, h, z, per * force_variance(block(p), i))
+            dof += 1.0
+    return cov, d, dof
 
 
 @inline
@@ -118,7 +122,8 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     """One sample; gyr and acc are α_m and f_m of the array."""
     acc_var, mag_var, g, iterations = p[:4]
     age_acc, age_mag, field = s[36] + dt, s[37] + dt, (s[38], s[39], s[40])
-    used, inverse_size, leak = own(p)[9:12], own(p)[12], force_products(p)
+    motion, dof = s[42], 0.0
+    used, inverse_size, leak = own(p)[:3], own(p)[3], force_products(block(p))
 
     q, w, cov = predict(p, s, dt)
 
@@ -129,8 +134,9 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     north, down = p[7], p[8]
     shift = (0.0, 0.0, 0.0)
     if has_acc:
-        _, rate = rate_at(p, q, w, gyr, dt)
+        _, rate = rate_at(p, q, w, gyr, acc, dt)
         shift = add(rate, scale(-1.0, w))
+        motion = moving(p, motion, rate, acc, age_acc)
     if has_mag:
         has_mag = not is_sample(mag) or dot(mag, mag) > 0.0
     if has_mag:
@@ -148,25 +154,29 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
                 k = 1.0 / math.sqrt(field[0] * field[0] + field[1] * field[1])
                 north, down = k * field[0], k * field[1]
 
+    d = NO_CORRECTION
     if has_acc or has_mag:
-        prior, d = cov, NO_CORRECTION
+        prior = cov
         for _ in range(int(iterations)):
-            at, d, cov = d, NO_CORRECTION, prior
+            at, d, cov, dof = d, NO_CORRECTION, prior, 0.0
             q_at, w_at = corrected(q, w, at)
             m = matrix_nb(q_at)
             if has_acc:
                 rate = add(w_at, shift)
                 y = add(acc, add(scale(g, m[2]), scale(-1.0, products(leak, rate))))
                 slope = products_slope(leak, rate)
-                cov, d = correct_force(p, cov, d, at, y, m, slope, acc_var / age_acc)
+                cov, d, dof = correct_force(p, cov, d, at, y, m, slope, acc_var / age_acc)
             if has_mag:
                 cov, d = correct_mag(cov, d, at, used, mag, m, north, down, mag_var / age_mag)
+                # two also of a unit vector, as noise along it is gone
+                dof += 2.0
         q, w = corrected(q, w, d)
     if has_acc:
         age_acc = 0.0
     if has_mag:
         age_mag = 0.0
-    return finished(p, s, q, w, cov, gyr, is_sample(acc), dt) + (age_acc, age_mag) + field + (0.0,)
+    state = finished(p, s, q, w, cov, (gyr, acc), dt)
+    return state + (age_acc, age_mag) + field + (0.0, motion, d[6], dof)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +205,7 @@ class GyroFreeDirect(GyroFreeKalman):
     kernel = Kernel(
         "gyro-free-direct",
         step,
-        n_params=N_COMMON + 13,
+        n_params=N_COMMON + 4,
         n_state=N_STATE,
         n_out=N_OUT,
         output=output,
@@ -215,14 +225,9 @@ class GyroFreeDirect(GyroFreeKalman):
             do = "give dip in rad, and field in µT"
             raise InputError(expected("a known field with a magnetometer of two axes", "no dip", do=do))
 
-    def _force_axes(self) -> str:
-        return self.force_axes
-
     def _parameters(self, frame: Frame) -> Sequence[float]:
-        made = self.reduction()
         return (
-            *self._common(self.dip, self.field_window, made),
-            *selected_whitening(made.force_noise, self.force_axes).ravel(),
+            *self._common(self.dip, self.field_window, self.reduction(), self.force_axes),
             *(float(axis in self.mag_axes) for axis in "xyz"),
             0.0 if len(self.mag_axes) == 3 else 1.0 / self.field,
         )

@@ -31,7 +31,7 @@ Deviations. The residual is the rotation vector from the estimate to the attitud
 ``residual="tangent"``. To first order both are the same measurement, as the noise is propagated accordingly; but
 tangents do not know an attitude from the one with heading turned by 180°, and fail near roll and heading ±90° too.
 With them samples near either are left out altogether. What is said in `gyro_free_direct` about (3.6), (3.7) and
-(3.25), about correlated noise and the number of states holds here.
+(3.25), about correlated noise, linear acceleration and the number of states holds here.
 """
 
 from __future__ import annotations
@@ -41,16 +41,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
+from northdown.estimators._array_coupling import force_products
 from northdown.estimators._gyro_free import (
     N_COMMON,
     N_OUT,
     N_STATE,
     GyroFreeKalman,
     aligned,
+    block,
     corrected,
     finished,
     flagged,
-    force_products,
+    moving,
     output,
     own,
     predict,
@@ -107,7 +109,7 @@ def tilt_variances(cov: Any, yaw: float) -> Any:
 @inline
 def noise_of(p: Any, prior: Any, age: float) -> Any:
     """Variances of cos θ φ and of θ, the latter less k times the former, and k, at the predicted angles."""
-    c_xx, c_xy, c_xz, c_yy, c_yz, c_zz = own(p)[:6]
+    c_xx, c_xy, c_xz, c_yy, c_yz, c_zz = block(p)[63:69]
     sr, cr, cp = math.sin(prior[0]), math.cos(prior[0]), max(1e-3, math.cos(prior[1]))
     t = p[0] / (p[2] * p[2] * age)
     v_1 = t * (cr * cr * c_yy - 2.0 * sr * cr * c_yz + sr * sr * c_zz)
@@ -150,7 +152,7 @@ def rate_row(a: Any, slope: Any) -> Any:
 @inline
 def correct(p: Any, q: Any, w: Any, cov: Any, shift: Any, acc: Any, mag: Any, ages: Any, use: Any) -> Any:
     """Iterated update; `use` says whether pitch, and whether yaw is measured. Returns (P, correction)."""
-    g, tangent, leak = p[2], own(p)[6], force_products(p)
+    g, tangent, leak = p[2], own(p)[0], force_products(block(p))
     use_pitch, use_yaw = use
     prior = to_zyx(q)
     v_1, v_2, k = noise_of(p, prior, ages[0])
@@ -203,25 +205,32 @@ def correct(p: Any, q: Any, w: Any, cov: Any, shift: Any, acc: Any, mag: Any, ag
 def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     """One sample; gyr and acc are α_m and f_m of the array."""
     age_acc, age_mag, flag = s[36] + dt, s[37] + dt, 0.0
+    motion, field, d, dof = s[42], (s[38], s[39], s[40]), NO_CORRECTION, 0.0
 
     q, w, cov = predict(p, s, dt)
 
     if is_sample(acc) and age_acc > 0.0 and dot(acc, acc) > 0.0:
-        _, rate = rate_at(p, q, w, gyr, dt)
-        force = add(acc, scale(-1.0, products(force_products(p), rate)))
-        near = is_singular(own(p)[7], own(p)[6], to_zyx(q), force, p[2])
+        _, rate = rate_at(p, q, w, gyr, acc, dt)
+        motion = moving(p, motion, rate, acc, age_acc)
+        force = add(acc, scale(-1.0, products(force_products(block(p)), rate)))
+        near = is_singular(own(p)[1], own(p)[0], to_zyx(q), force, p[2])
         use_yaw = age_mag > 0.0 and has_heading(down_b(q), mag) and has_heading(force, mag)
         if near:
             flag = _NEAR_SINGULAR
-        if not near or (use_yaw and own(p)[6] == 0.0):
+        if not near or (use_yaw and own(p)[0] == 0.0):
             shift = add(rate, scale(-1.0, w))
             cov, d = correct(p, q, w, cov, shift, acc, mag, (age_acc, age_mag), (not near, use_yaw))
             q, w = corrected(q, w, d)
-            age_acc = 0.0
+            age_acc, dof = 0.0, 1.0
+            if not near:
+                dof += 1.0
             if use_yaw:
+                h = rotate(q, mag)
+                field = (math.sqrt(h[0] * h[0] + h[1] * h[1]), h[2], age_mag)
                 age_mag = 0.0
-    state = finished(p, s, q, w, cov, gyr, is_sample(acc), dt)
-    return state + (age_acc, age_mag, s[38], s[39], s[40], flag)
+                dof += 1.0
+    state = finished(p, s, q, w, cov, (gyr, acc), dt)
+    return state + (age_acc, age_mag) + field + (flag, motion, d[6], dof)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,7 +256,7 @@ class GyroFreeIndirect(GyroFreeKalman):
     kernel = Kernel(
         "gyro-free-indirect",
         step,
-        n_params=N_COMMON + 8,
+        n_params=N_COMMON + 2,
         n_state=N_STATE,
         n_out=N_OUT,
         output=output,
@@ -260,11 +269,8 @@ class GyroFreeIndirect(GyroFreeKalman):
     singular_pitch: float = parameter(1.4, unit="rad", low=0.0, high=1.5708)
 
     def _parameters(self, frame: Frame) -> Sequence[float]:
-        made = self.reduction()
-        c = made.force_noise
         return (
-            *self._common(None, 1.0, made),
-            *(c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2]),
+            *self._common(None, 1.0, self.reduction(), "xyz"),
             float(self.residual == "tangent"),
             self.singular_pitch,
         )

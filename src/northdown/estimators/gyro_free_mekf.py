@@ -40,20 +40,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from northdown._validation import FloatArray
 from northdown.estimators._array import Reduction, redundancy
+from northdown.estimators._array_coupling import (
+    acceleration_flag,
+    coupling,
+    force_products,
+    force_residual,
+    looseness,
+    subtract,
+    turning,
+)
 from northdown.estimators._array_filter import GyroFreeFilter
 from northdown.estimators._array_mekf import (
     correct_extra,
     correct_field,
     correct_force,
-    coupling,
-    force_residual,
     predict,
-    subtract,
-    turning,
 )
 from northdown.estimators.base import parameter
 from northdown.frames import Frame
@@ -75,14 +78,14 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) ->
     """One sample; gyr and acc are α_m and f_m of the array, extra its redundant combinations.
 
     s = (q 4, ω 3, biases 6, P 78, ω̇ 3, rate 3, whether these two are of the last sample, Δ, s, motion, ages of force
-    and field, field's horizontal, down and age, u).
+    and field, field's horizontal, down and age, u, NIS, dof).
     """
     motion, age_acc, age_mag, field, u = s[100], s[101] + dt, s[102] + dt, (s[103], s[104], s[105]), 0.0
     biases = ((s[7], s[8], s[9]), (s[10], s[11], s[12]))
     loose = s[99]
     q, w, cov = predict(p, s, dt)
     zero = (0.0, 0.0, 0.0)
-    d = (zero, zero, zero, zero)
+    d, dof = (zero, zero, zero, zero, 0.0), 0.0
 
     if dot(mag, mag) > 0.0 and age_mag > 0.0:
         h = rotate(q, mag)
@@ -93,40 +96,43 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) ->
         h = unit(h)
         y = (h[0] - north, h[1], h[2] - down)
         cov, d = correct_field(cov, d, y, north, down, p[4] / (weight * age_mag))
-        age_mag = 0.0
+        age_mag, dof = 0.0, 2.0
 
     has_acc = is_sample(acc)
     shift = zero
     if has_acc and age_acc > 0.0:
-        g, _ = coupling(p, loose)
-        first = turning(p, q, w, gyr, acc, biases, g)
+        g, _ = coupling(p[13:82], loose)
+        first = turning(p[13:82], p[3], q, w, subtract(gyr, biases[0]), subtract(acc, biases[1]), g)
         shift = scale(0.5 * dt, first)
         rate = add(w, shift)
         per = p[0] / age_acc
         if is_sample((extra[0], extra[1], extra[2])):
-            cov, d = correct_extra(p, cov, d, rate, extra, p[10] / age_acc)
-        y = force_residual(p, q, rate, acc, biases[1])
-        f_n = rotate(q, subtract(acc, add(biases[1], products(p[31:49], rate))))
+            cov, d, more = correct_extra(p, cov, d, rate, extra, p[10] / age_acc)
+            dof += more
+        y = force_residual(p[13:82], p[3], q, rate, subtract(acc, biases[1]))
+        f_n = rotate(q, subtract(acc, add(biases[1], products(force_products(p[13:82]), rate))))
         motion = linear_acceleration(motion, f_n, p[3], age_acc, p[9])
-        # Tilt errors too look like acceleration. Not taking them off errs on the safe side; taking off what P expects
-        # of them would trust gravity most when tilt is least known.
-        loose = p[8] * max(0.0, motion - per * (p[73] + p[74] + p[75])) / p[0]
+        loose = looseness(p[13:82], p[0], p[8], motion, per)
         cov, d = correct_force(p, cov, d, q, rate, y, loose, per)
         age_acc = 0.0
+        dof += 3.0
 
     q = normalize(multiply(exp(d[0]), q))
     w = add(w, d[1])
     biases = (add(biases[0], d[2]), add(biases[1], d[3]))
     acceleration, rate, fresh = (s[91], s[92], s[93]), zero, 0.0
     if has_acc:
-        g, _ = coupling(p, loose)
-        first = turning(p, q, w, gyr, acc, biases, g)
+        g, _ = coupling(p[13:82], loose)
+        first = turning(p[13:82], p[3], q, w, subtract(gyr, biases[0]), subtract(acc, biases[1]), g)
         rate = add(w, scale(0.5 * dt, first))
-        acceleration, fresh = turning(p, q, rate, gyr, acc, biases, g), 1.0
+        acceleration, fresh = (
+            turning(p[13:82], p[3], q, rate, subtract(gyr, biases[0]), subtract(acc, biases[1]), g),
+            1.0,
+        )
     else:
         rate = add(w, scale(0.5 * dt, acceleration))
     head = q + w + biases[0] + biases[1] + flat(cov) + acceleration + rate
-    return head + (fresh, dt, loose, motion, age_acc, age_mag) + field + (u,)
+    return head + (fresh, dt, loose, motion, age_acc, age_mag) + field + (u, d[4], dof)
 
 
 @inline
@@ -162,17 +168,18 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, rate, covariance of the attitude, sigma of the rate, field's departure u, linear acceleration."""
-    _, noise = coupling(p, s[99])
+    """Attitude, rate, covariance of the attitude, sigma of the rate, diagnostics."""
+    _, noise = coupling(p[13:82], s[99])
     n = 0.25 * s[98] * p[0]
     sigma = (math.sqrt(s[46] + n * noise[0]), math.sqrt(s[49] + n * noise[3]), math.sqrt(s[51] + n * noise[5]))
-    return s[:4] + s[94:97] + full(s[13:19]) + sigma + (s[106], math.sqrt(s[100]))
+    return s[:4] + s[94:97] + full(s[13:19]) + sigma + (math.sqrt(s[100]), s[106], s[107], s[108])
 
 
 @inline
 def flagged(p: Any, s: Any) -> int:
-    """Whether the magnetometer's sample was all but rejected."""
-    return _MAG_REJECTED if s[106] > REJECTED else 0
+    """Whether linear acceleration or a disturbed field has lowered the weight of this sample."""
+    flags = acceleration_flag(p[13:82], s[99], s[101])
+    return flags | _MAG_REJECTED if s[106] > REJECTED else flags
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +190,8 @@ class GyroFreeMEKF(GyroFreeFilter):
     ----------
     motion_time : float
         Time (s) over which linear accelerations stay correlated. Raising it distrusts gravity more whenever the body
-        has been accelerating.
+        has been accelerating, and leans on the angular acceleration, with its biases. 0: all specific force is
+        gravity.
     motion_window : float
         Time constant (s) of the mean square of linear acceleration. Raising it distrusts for longer after each
         acceleration.
@@ -209,8 +217,10 @@ class GyroFreeMEKF(GyroFreeFilter):
 
     Notes
     -----
-    `Orientation.diagnostics` has ``field_departure`` (u, rejected above 4.6) and ``linear_acceleration`` (RMS over
-    `motion_window`, m/s²).
+    ``acceleration`` of the diagnostics holds noise and tilt errors too. Where linear acceleration leaves the specific
+    force less than a tenth of its weight at rest, its samples carry `Flag.ACC_REJECTED`. ``field_departure`` is u:
+    above 4.6 samples of the magnetometer have less than 1 % of their weight, `Flag.MAG_REJECTED`. Where `bias_time`
+    counts a bias as noise the mean of ``nis`` is somewhat below ``nis_dof``.
     """
 
     name = "gyro-free-mekf"
@@ -218,8 +228,8 @@ class GyroFreeMEKF(GyroFreeFilter):
         "gyro-free-mekf",
         step,
         n_params=121,
-        n_state=107,
-        n_out=21,
+        n_state=109,
+        n_out=23,
         output=output,
         aligned=aligned,
         flagged=flagged,
@@ -230,8 +240,10 @@ class GyroFreeMEKF(GyroFreeFilter):
         "rate": slice(4, 7),
         "covariance": slice(7, 16),
         "rate_sigma": slice(16, 19),
-        "field_departure": slice(19, 20),
-        "linear_acceleration": slice(20, 21),
+        "acceleration": slice(19, 20),
+        "field_departure": slice(20, 21),
+        "nis": slice(21, 22),
+        "nis_dof": slice(22, 23),
     }
 
     motion_time: float = parameter(0.03, unit="s", low=0.0)
@@ -244,14 +256,8 @@ class GyroFreeMEKF(GyroFreeFilter):
     dip_gate: float = parameter(0.05, unit="rad", above=0.0)
     field_window: float = parameter(100.0, unit="s", above=0.0)
 
-    def _force_axes(self) -> str:
-        return ""
-
     def _parameters(self, frame: Frame) -> Sequence[float]:
         made = self.reduction()
-        noise = made.matrix @ made.matrix.T
-        values, axes = np.linalg.eigh(noise[3:, 3:])
-        upper = np.triu_indices(3)
         _, seen = redundancy(self._geometry())
         return (
             self.acc_noise**2,
@@ -263,19 +269,14 @@ class GyroFreeMEKF(GyroFreeFilter):
             *(self.motion_time, self.motion_window),
             self.acc_noise**2 + self.start_bias**2 * self.bias_time,
             *((math.nan, math.nan) if self.dip is None else (math.cos(self.dip), math.sin(self.dip))),
-            *made.products.ravel(),
-            *noise[:3, :3][upper],
-            *(noise[:3, 3:] @ axes).ravel(),
-            *axes.ravel(),
-            *values,
-            *noise[3:, 3:][upper],
+            *made.block(),
             *seen.ravel(),
             *(self.start_tilt**2, self.start_heading**2, self.start_rate**2),
         )
 
     def _initial_state(self, quat: FloatArray, frame: Frame) -> Sequence[float]:
         covariance = start_covariance(self._parameters(frame), True)
-        return (*(0.0,) * 9, *covariance, *(0.0,) * 16)
+        return (*(0.0,) * 9, *covariance, *(0.0,) * 18)
 
     def reduction(self) -> Reduction:
         """The numbers that the filter makes of a sample of its array, redundant combinations among them."""

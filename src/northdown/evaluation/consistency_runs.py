@@ -1,8 +1,9 @@
 """Monte Carlo test of a filter's covariance, on data that are just as its model supposes.
 
-Each run draws a motion, white noise of each sensor, a gyroscope bias and its random walk, and the error of the
-attitude at the start, all from the distributions that the filter is told. Turns only, as linear acceleration is not
-part of the model. What then departs from the χ² distribution is the filter's own doing.
+Each run draws a motion, white noise of each sensor, a gyroscope bias and its random walk (or the biases of an
+array's accelerometers), and the error of the attitude at the start, all from the distributions that the filter is
+told. Turns only, as linear acceleration is not part of the model. What then departs from the χ² distribution is the
+filter's own doing.
 
 Errors of one run are correlated over time, so that not samples but runs count as independent: at each time the mean
 over runs is compared with χ², and the interval of the overall mean follows from the spread of the runs' means.
@@ -188,13 +189,14 @@ def monte_carlo(
     filter_ = _check_filter(estimator, world, parameters)
     count = int(check_number("runs", runs, low=2.0))
     check_confidence(confidence)
+    biased = any(f.name == "start_bias" for f in fields(filter_))
     tally = _Tally()
     # one seed for each run, and no run of one seed the same as one of another
     seeds = np.random.SeedSequence(check_seed(seed)).generate_state(count, np.uint64)
     for k, number in enumerate(seeds):
         if progress is not None:
             progress(k)
-        recording, start = world.draw(int(number), bias="gyr_bias" in filter_.outputs)
+        recording, start = world.draw(int(number), bias=biased, array="array" in filter_.needs)
         # the truth itself, as the mask of the recording would leave out its rests
         result = filter_.run(recording, initial=start)
         tally.add(nees(result, find_reference(recording)), result)
@@ -206,10 +208,8 @@ def _check_filter(
 ) -> Estimator:
     from northdown.estimators import registry
 
-    # the simulated sensors have no accelerometer array
-    able_itself = isinstance(estimator, type) and "covariance" in getattr(estimator, "outputs", ())
-    if not able_itself or "array" in estimator.needs:
-        able = [n for n, e in registry().items() if "covariance" in e.outputs and "array" not in e.needs]
+    if not (isinstance(estimator, type) and "covariance" in getattr(estimator, "outputs", ())):
+        able = [n for n, e in registry().items() if "covariance" in e.outputs]
         got = getattr(estimator, "name", None) or repr(estimator)
         raise InputError(expected(f"the class of an estimator with a covariance out of {', '.join(able)}", got))
     known = [f.name for f in fields(estimator)]

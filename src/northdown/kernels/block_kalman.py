@@ -122,11 +122,14 @@ def joined(a: Any, b: Any) -> Any:
 
 @inline
 def gain(p: Any, d: Any, ph: Any, s: float, y: float) -> Any:
-    """Scalar update from P Hᵀ, s = H P Hᵀ + r and the residual y at the point reached: returns (P, d)."""
+    """Scalar update from P Hᵀ, s = H P Hᵀ + r and the residual y at the point reached: returns (P, d).
+
+    Last in d is the normalised innovation squared Σ y²/s of the updates that it came from.
+    """
     k = 1.0 / s
     g = y * k
     t, w, a, f = ph
-    d = (add(d[0], scale(g, t)), add(d[1], scale(g, w)), add(d[2], scale(g, a)), add(d[3], scale(g, f)))
+    d = (add(d[0], scale(g, t)), add(d[1], scale(g, w)), add(d[2], scale(g, a)), add(d[3], scale(g, f)), d[4] + g * y)
     kt, kw, ka, kf = scale(k, t), scale(k, w), scale(k, a), scale(k, f)
     return (
         (

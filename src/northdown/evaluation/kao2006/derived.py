@@ -55,12 +55,18 @@ def estimator(constants: Constants, method: Method, iterations: int = 1) -> Gyro
             field=FIELD,
             gravity=constants.gravity,
             iterations=iterations,
+            motion_time=0.0,
             dip=constants.dip,
             force_axes="yz",
             mag_axes="xy",
         )
     return GyroFreeIndirect(
-        acc_noise=acc_noise, mag_noise=mag_noise, field=FIELD, gravity=constants.gravity, iterations=iterations
+        acc_noise=acc_noise,
+        mag_noise=mag_noise,
+        field=FIELD,
+        gravity=constants.gravity,
+        iterations=iterations,
+        motion_time=0.0,
     )
 
 
