@@ -41,9 +41,10 @@ def angle(a, b):
     return float((a * b.inv()).magnitude().max())
 
 
-@pytest.mark.parametrize("delay", [0.013, 0.03, -0.008])
-def test_delay_of_the_magnetometer_is_found(delay):
-    found = nd.CalibratingEKF().run(sensors(4, seconds=60.0, delay=delay, noise=0.1)).diagnostics["mag_delay"][-1]
+@pytest.mark.parametrize(("delay", "sigma"), [(0.013, 0.01), (0.03, 0.05), (-0.008, 0.01)])
+def test_delay_of_the_magnetometer_is_found(delay, sigma):
+    filter_ = nd.CalibratingEKF(mag_delay_sigma=sigma)  # 30 ms are three sigmas of the default
+    found = filter_.run(sensors(4, seconds=60.0, delay=delay, noise=0.1)).diagnostics["mag_delay"][-1]
     # s; the noise is a tenth of what the filter expects, whose own sigma is 1 ms by then
     assert found == pytest.approx(delay, abs=1e-3)
 
@@ -252,6 +253,26 @@ def test_a_new_steady_field_becomes_the_reference():
     assert never.has(Flag.MAG_REJECTED)[u.time > 130.0].mean() > 0.9
 
 
+def test_a_disturbed_field_that_looks_right_for_moments_is_not_believed():
+    recording = sensors(22, seconds=60.0, noise=0.1)
+    field = recording.reference.rotation.apply(recording.mag)
+    # from 20 s on half as strong again and turned by 40°; in every second, for a fifth, of the right norm and dip
+    strength = np.where(recording.time % 1.0 < 0.2, 1.0, 1.5)[:, None]
+    wrong = Rotation.from_euler("z", np.deg2rad(40.0)).apply(strength * field)
+    late = recording.time > 20.0
+    mag = np.where(late[:, None], recording.reference.rotation.apply(wrong, inverse=True), recording.mag)
+    disturbed = dataclasses.replace(recording, mag=mag)
+
+    def error(**parameters):
+        estimate = nd.CalibratingEKF(**parameters).run(disturbed)
+        return nd.attitude_error(estimate, recording, mask=late).rmse().heading_deg
+
+    # judged by the moment alone, the heading is drawn to the wrong north, by several degrees
+    without = error(gate_window=0.0)
+    assert without > 3.0
+    assert error() < 0.4 * without
+
+
 def test_clipped_gyroscope_is_not_believed():
     recording = sensors(30, seconds=60.0, noise=0.1)
     limit = 0.5 * np.abs(recording.gyr).max()
@@ -328,9 +349,9 @@ def test_other_estimators_say_that_they_do_not_smooth():
 
 # degrees, real time and smoothed: what was measured, and a tenth more
 BROAD = {
-    "05_undisturbed_slow_rotation_with_breaks_B": (0.57, 0.36),
-    "21_undisturbed_fast_combined": (1.69, 1.16),
-    "29_disturbed_stationary_magnet_B": (1.44, 1.36),
+    "05_undisturbed_slow_rotation_with_breaks_B": (0.62, 0.36),
+    "21_undisturbed_fast_combined": (1.52, 1.07),
+    "29_disturbed_stationary_magnet_B": (1.29, 1.24),
 }
 
 

@@ -44,7 +44,7 @@ class Dense:
         )
         sigma = [f.start_tilt] * 2 + [f.start_heading] + [f.start_bias] * 3 + [0.1] * 3
         self.P = np.diag(sigma + [f.gyr_matrix] * 9 + [f.rest_offset] * 3 + [f.mag_delay_sigma]) ** 2
-        self.motion = self.clock = self.age_acc = self.age_mag = self.learnt = 0.0
+        self.motion = self.clock = self.age_acc = self.age_mag = self.learnt = self.mean_u = 0.0
         self.reference = np.zeros(2)
         self.turned, self.history = np.zeros(3), [(0.0, np.zeros(3))]
         self.still, self.blocks, self.epochs = False, [], []
@@ -162,8 +162,12 @@ class Dense:
             across = off - (off @ along) * along
             u = min(60.0, (off @ along / f.norm_gate) ** 2 + across @ across / f.dip_gate**2)
             gain = min(1.0, age / min(self.learnt, f.field_window)) / (1.0 + u)
-        self.u = u
         self.reference = self.reference + gain * (sample - self.reference)
+        if f.gate_window > 0.0:
+            kept = max(0.0, 1.0 - age / f.gate_window)
+            self.mean_u = kept * self.mean_u + (1.0 - kept) * u
+            u = max(u, self.mean_u)
+        self.u = u
 
         def angle(v):
             return math.atan2(v[1], v[0])
@@ -216,18 +220,20 @@ def recording():
 CASES = [
     {},
     {"inflation": 1.0, "tilt_sigma": 0.0, "heading_sigma": 0.0, "time_sigma": 0.0, "rest_gyr": 0.0},
+    {"gate_window": 0.0, "norm_gate": 0.01},
     {
         "mag_delay": 0.013,
         "mag_delay_sigma": 0.01,
         "mag_noise": 0.005,
         "gyr_matrix": 0.02,
         "norm_gate": 0.01,
+        "gate_window": 0.3,
         "epoch": 0.07,
     },
 ]
 
 
-@pytest.mark.parametrize("parameters", CASES, ids=["defaults", "no rest", "delay"])
+@pytest.mark.parametrize("parameters", CASES, ids=["defaults", "no rest", "gate of the moment", "delay"])
 def test_agrees_with_a_dense_implementation(recording, parameters):
     f = nd.CalibratingEKF(**parameters)
     start = recording.reference.rotation[0]

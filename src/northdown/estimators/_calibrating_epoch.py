@@ -35,6 +35,7 @@ from northdown.estimators._calibrating_layout import (
     HEADING_SLOPE,
     MAG_DELAY,
     MATRIX,
+    MEAN_DEPARTURE,
     MOTION,
     N_BLOCK,
     N_BLOCKS,
@@ -264,12 +265,16 @@ def _take_heading(p: Any, s: Any) -> None:
         gain = min(1.0, age / min(learnt, p.field_window)) / (1.0 + u)
         if u > REJECTED and _is_new_field(p, s, h, z, age):
             s[FIELD], s[FIELD + 1], s[FIELD + 2] = s[NEW_FIELD], s[NEW_FIELD + 1], s[NEW_FIELD + 2]
-            u = 0.0
+            u = s[MEAN_DEPARTURE] = 0.0
         elif u <= REJECTED:
             s[NEW_FIELD + 2] = 0.0
-    s[DEPARTURE] = u
     s[FIELD] += gain * (h - s[FIELD])
     s[FIELD + 1] += gain * (z - s[FIELD + 1])
+    # A disturbed field has the norm and the dip of the reference now and then, by chance.
+    if p.gate_window > 0.0:
+        s[MEAN_DEPARTURE] += min(1.0, age / p.gate_window) * (u - s[MEAN_DEPARTURE])
+        u = max(u, s[MEAN_DEPARTURE])
+    s[DEPARTURE] = u
     if not square > PARALLEL * (square + z * z):
         return
     hx, hy = x * z / square, y * z / square

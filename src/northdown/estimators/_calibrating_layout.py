@@ -23,31 +23,32 @@ MOTION: Final = 23  # mean square of linear acceleration
 AGE_ACC: Final = 24  # time since the sensor's last sample
 AGE_MAG: Final = 25
 FIELD: Final = 26  # reference: horizontal, down, age
-DEPARTURE: Final = 29
+DEPARTURE: Final = 29  # by which the last heading was weighed
 STILL: Final = 30
 GIVEN: Final = 31  # kind of rest as found beforehand; negative where the filter finds it itself
 DENSITY: Final = 32  # spectral density of the gyroscope's noise in the window of rest
 CLOSED: Final = 33  # whether the last sample closed an epoch
 RATE: Final = 34  # angular rate, body axes
 NEW_FIELD: Final = 37  # another field: horizontal, down, for how long it has been seen
+MEAN_DEPARTURE: Final = 40  # over the last moments
 
 # Sums over the samples of an epoch; all of them are cleared before the next.
-SUMS: Final = 40
-TIME: Final = 40
-TIME_ACC: Final = 41
-COUNT_MAG: Final = 42
-RATE_SQUARE: Final = 43
-ACC_SQUARE: Final = 44
-CLIPPED: Final = 45  # time in which the gyroscope was at the end of its range
-TURN: Final = 46  # Σ R dt by rows
-SCALED: Final = 55  # Σ R r_k dt in motion, three matrices by rows, one after the other
-REST_TURN: Final = 82  # Σ R dt at rest
-FORCE: Final = 91  # Σ R a dt
+SUMS: Final = 41
+TIME: Final = 41
+TIME_ACC: Final = 42
+COUNT_MAG: Final = 43
+RATE_SQUARE: Final = 44
+ACC_SQUARE: Final = 45
+CLIPPED: Final = 46  # time in which the gyroscope was at the end of its range
+TURN: Final = 47  # Σ R dt by rows
+SCALED: Final = 56  # Σ R r_k dt in motion, three matrices by rows, one after the other
+REST_TURN: Final = 83  # Σ R dt at rest
+FORCE: Final = 92  # Σ R a dt
 N_MOVE: Final = 48  # numbers from TURN to FORCE
-SHIFT: Final = 94  # Σ (R a + g) dt
-FIELD_SUM: Final = 97
-FIELD_SLOPE: Final = 100  # its derivative with respect to the delay
-BLOCK: Final = 103  # the epoch's statistics, as `kernels.stillness` keeps them
+SHIFT: Final = 95  # Σ (R a + g) dt
+FIELD_SUM: Final = 98
+FIELD_SLOPE: Final = 101  # its derivative with respect to the delay
+BLOCK: Final = 104  # the epoch's statistics, as `kernels.stillness` keeps them
 N_BLOCK: Final = 10
 SUMS_END: Final = BLOCK + N_BLOCK
 
@@ -88,6 +89,7 @@ class Terms(NamedTuple):
     norm_gate: float
     dip_gate: float
     gate_power: float
+    gate_window: float
     field_window: float
     field_new: float
     rest_gyr: float

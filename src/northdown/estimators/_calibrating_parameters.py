@@ -45,6 +45,9 @@ class CalibrationParameters(Estimator):
         Departure of the field's dip, rad, that makes u = 1. Raising it accepts more disturbance.
     gate_power : float
         Power of 1 + u by which a departure raises the variance. Raising it rejects more sharply.
+    gate_window : float
+        Time constant (s) of the mean departure that counts where it is more than the present one; 0 for none. Raising
+        it distrusts the field for longer after a disturbance, and moments at which a disturbed field looks right.
     field_window : float
         Time constant (s) with which the reference of norm and dip follows the field. Raising it adapts more slowly to
         a new place, and is fooled less by a long disturbance.
@@ -103,28 +106,29 @@ class CalibrationParameters(Estimator):
     """
 
     gyr_noise: float = parameter(1e-4, unit="rad/s/√Hz", above=0.0)
-    gyr_scale: float = parameter(2e-4, unit="1/√Hz", low=0.0)
-    gyr_bias_walk: float = parameter(1e-4, unit="rad/s²/√Hz", low=0.0)
-    acc_noise: float = parameter(0.02, unit="m/s²/√Hz", above=0.0)
-    acc_motion: float = parameter(0.05, unit="s⁴/m²", low=0.0)
-    speed_noise: float = parameter(0.1, unit="m/s/√Hz", above=0.0)
+    gyr_scale: float = parameter(1e-4, unit="1/√Hz", low=0.0)
+    gyr_bias_walk: float = parameter(5e-5, unit="rad/s²/√Hz", low=0.0)
+    acc_noise: float = parameter(0.01, unit="m/s²/√Hz", above=0.0)
+    acc_motion: float = parameter(1e-3, unit="s⁴/m²", low=0.0)
+    speed_noise: float = parameter(0.05, unit="m/s/√Hz", above=0.0)
     speed_motion: float = parameter(0.1, unit="s⁴/m²", low=0.0)
     motion_window: float = parameter(1.0, unit="s", above=0.0)
-    mag_noise: float = parameter(0.05, unit="rad/√Hz", above=0.0)
+    mag_noise: float = parameter(0.02, unit="rad/√Hz", above=0.0)
     norm_gate: float = parameter(0.05, above=0.0)
     dip_gate: float = parameter(0.05, unit="rad", above=0.0)
-    gate_power: float = parameter(3.0, low=0.0)
+    gate_power: float = parameter(2.0, low=0.0)
+    gate_window: float = parameter(0.5, unit="s", low=0.0)
     field_window: float = parameter(200.0, unit="s", above=0.0)
     field_new: float = parameter(60.0, unit="s", above=0.0)
     rest_gyr: float = parameter(0.005, unit="rad/s", low=0.0)
     rest_acc: float = parameter(0.15, unit="m/s²", low=0.0)
     rest_rate: float = parameter(0.035, unit="rad/s", low=0.0)
     rest_window: float = parameter(1.0, unit="s", low=0.1, high=1.5)
-    rest_noise: float = parameter(5e-5, unit="rad/s/√Hz", above=0.0)
-    rest_offset: float = parameter(2e-4, unit="rad/s", low=0.0)
-    gyr_matrix: float = parameter(2e-3, low=0.0)
+    rest_noise: float = parameter(1e-4, unit="rad/s/√Hz", above=0.0)
+    rest_offset: float = parameter(1e-4, unit="rad/s", low=0.0)
+    gyr_matrix: float = parameter(1e-3, low=0.0)
     mag_delay: float = parameter(0.0, unit="s", low=-0.05, high=0.05)
-    mag_delay_sigma: float = parameter(0.05, unit="s", low=0.0, high=0.05)
+    mag_delay_sigma: float = parameter(0.01, unit="s", low=0.0, high=0.05)
     calibration_time: float = parameter(36000.0, unit="s", above=0.0)
     epoch: float = parameter(0.04, unit="s", low=0.03, high=0.5)
     gyr_range: float = parameter(0.0, unit="rad/s", low=0.0)
@@ -133,9 +137,9 @@ class CalibrationParameters(Estimator):
     start_tilt: float = parameter(0.05, unit="rad", above=0.0)
     start_heading: float = parameter(0.2, unit="rad", above=0.0)
     start_bias: float = parameter(0.02, unit="rad/s", above=0.0)
-    inflation: float = parameter(1.2, above=0.0)
+    inflation: float = parameter(2.0, above=0.0)
     tilt_sigma: float = parameter(0.003, unit="rad", low=0.0)
-    heading_sigma: float = parameter(0.01, unit="rad", low=0.0)
+    heading_sigma: float = parameter(0.015, unit="rad", low=0.0)
     time_sigma: float = parameter(0.0025, unit="s", low=0.0)
 
     def _terms(self) -> Terms:
@@ -152,6 +156,7 @@ class CalibrationParameters(Estimator):
             norm_gate=self.norm_gate,
             dip_gate=self.dip_gate,
             gate_power=self.gate_power,
+            gate_window=self.gate_window,
             field_window=self.field_window,
             field_new=self.field_new,
             rest_gyr=self.rest_gyr**2,

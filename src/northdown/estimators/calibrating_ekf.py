@@ -58,6 +58,8 @@ h = mean of R̂ exp(−φ) m, where φ is the turn during the last τ:
 so that the delay is seen in the residual heading as often as the body turns about the vertical to and fro. Variance:
 `mag_noise`² / T · (1 + u)^`gate_power`, with the departure u = (Δnorm / `norm_gate`)² + (Δdip / `dip_gate`)² of the
 field from its reference, the mean over the past `field_window` weighted by 1/(1 + u); the first second is not judged.
+For the variance, the mean of u over the past `gate_window` counts where it is more than u: a disturbed field has norm
+and dip of the reference now and then, while its heading is still wrong.
 A field that is all but rejected (u > 4.6) and steady for `field_new` of motion becomes the reference.
 
 *Rest.* Where both sensors hardly scatter for `rest_window` (before the sample in real time, around it in `smooth`)
@@ -135,8 +137,8 @@ class CalibratingEKF(CalibrationParameters):
 
     Notes
     -----
-    `Orientation.diagnostics` has `field_departure` (u of the last epoch; above 4.6 the sample is flagged
-    `MAG_REJECTED`), `mag_delay` (τ, s) and `still` (1 at rest).
+    `Orientation.diagnostics` has `field_departure` (u, or its mean, as the last heading was weighed; above 4.6 the
+    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s) and `still` (1 at rest).
     """
 
     name = "calibrating-ekf"
