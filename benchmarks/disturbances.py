@@ -22,11 +22,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import _disturbance_figures
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+import _disturbance_figures
 import northdown as nd
 from _scenarios import SCENARIOS, Case, feeling
 from northdown.evaluation import AttitudeError
