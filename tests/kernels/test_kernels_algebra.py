@@ -37,6 +37,23 @@ def test_product_is_scipys(p, q):
     assert np.allclose(scipy_of(quaternion.multiply(p, q)).as_matrix(), expected, atol=ROUNDING)
 
 
+@given(quaternions, st.sampled_from([1e-9, 1e-3, 0.1, 3.0]), directions)
+@settings(max_examples=60, deadline=None)
+def test_turns_in_body_and_navigation_axes_are_scipys(q, size, v):
+    v = tuple(size * np.array(v) / np.linalg.norm(v))
+    long = tuple(1.00001 * c for c in q)  # as rounding would leave it after very many steps
+    turned = so3.turn_body(long, v)
+    assert np.allclose(
+        scipy_of(turned).as_matrix(), (scipy_of(q) * Rotation.from_rotvec(v)).as_matrix(), atol=ROUNDING
+    )
+    assert abs(np.linalg.norm(turned) - 1.0) < ROUNDING
+    turned = so3.turn_navigation(v, long)
+    assert np.allclose(
+        scipy_of(turned).as_matrix(), (Rotation.from_rotvec(v) * scipy_of(q)).as_matrix(), atol=ROUNDING
+    )
+    assert abs(np.linalg.norm(turned) - 1.00001) < ROUNDING
+
+
 @given(quaternions, vectors)
 @settings(max_examples=60, deadline=None)
 def test_rotate_is_scipys_and_its_inverse_undoes_it(q, v):

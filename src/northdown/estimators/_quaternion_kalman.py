@@ -26,8 +26,8 @@ from northdown.estimators._kalman import BiasKalmanFilter, start_covariance, wei
 from northdown.frames import Frame
 from northdown.kernels.jit import inline
 from northdown.kernels.kalman import propagate_attitude_bias, symmetric3
-from northdown.kernels.quaternion import dot, multiply, normalize, scaled_axes
-from northdown.kernels.so3 import exp
+from northdown.kernels.quaternion import dot, scaled_axes
+from northdown.kernels.so3 import turn_body
 
 N_STATE = 38
 N_OUT = 23
@@ -41,7 +41,7 @@ def predict(p: Any, q: Any, b: Any, along: float, cov: Any, gyr: Any, dt: float)
         noise = (p[0] + p[1] * dot(rate, rate)) * dt
         along += 0.25 * noise
         cov = propagate_attitude_bias(cov, scaled_axes(dt, q), noise, p[2] * dt)
-        q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
+        q = turn_body(q, (rate[0] * dt, rate[1] * dt, rate[2] * dt))
     return q, along, cov
 
 

@@ -59,10 +59,10 @@ from northdown.frames import Frame
 from northdown.kernels.direction_error import is_sample
 from northdown.kernels.jit import inline
 from northdown.kernels.kalman import NO_CORRECTION
-from northdown.kernels.quaternion import conjugate, dot, multiply, normalize, rotate
+from northdown.kernels.quaternion import dot, multiply, normalize, rotate
 from northdown.kernels.quaternion_kalman import correct_field, correct_up
 from northdown.kernels.runner import Kernel
-from northdown.kernels.so3 import exp
+from northdown.kernels.so3 import turn_navigation
 from northdown.kernels.wahba import has_horizontal
 from northdown.kernels.weighting import field_departure, linear_acceleration
 
@@ -72,8 +72,8 @@ def tilt_only(q: Any, scale: float, d: Any, additive: float) -> Any:
     """What stage 1 may change of the correction δq = (scale, ½ d) ⊗ q, as a turn from the left."""
     if additive != 0.0:
         e = multiply((scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q)
-        return multiply(normalize((q[0] + e[0], q[1] + e[1], q[2] + e[2], q[3])), conjugate(q))
-    return exp((d[0], d[1], 0.0))
+        return normalize((q[0] + e[0], q[1] + e[1], q[2] + e[2], q[3]))
+    return turn_navigation((d[0], d[1], 0.0), q)
 
 
 @inline
@@ -81,8 +81,8 @@ def heading_only(q: Any, scale: float, d: Any, additive: float) -> Any:
     """What stage 2 may change, likewise."""
     if additive != 0.0:
         e = multiply((scale, 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]), q)
-        return multiply(normalize((q[0] + e[0], q[1], q[2], q[3] + e[3])), conjugate(q))
-    return exp((0.0, 0.0, d[2]))
+        return normalize((q[0] + e[0], q[1], q[2], q[3] + e[3]))
+    return turn_navigation((0.0, 0.0, d[2]), q)
 
 
 @inline
@@ -102,25 +102,23 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     if is_sample(acc) and age_acc > 0.0:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
-        r = (acc_var + motion_time * motion) / (g * g * age_acc)
+        r = (acc_var + motion_time * motion) * (1.0 / (g * g * age_acc))
         k = 1.0 / g
         up = (k * force[0], k * force[1], k * force[2] + 1.0)
         along, cov, scale, d = correct_up(along, cov, NO_CORRECTION, up, r)
-        turn = tilt_only(q, scale, d, additive)
-        q = multiply(turn, q)
+        q = tilt_only(q, scale, d, additive)
         b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_acc = 0.0
         nis, dof = d[6], 3.0
     h = rotate(q, mag)
     if has_horizontal(h) and age_mag > 0.0:
-        u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
+        u, factor, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
         horizontal = math.sqrt(h[0] * h[0] + h[1] * h[1])
         k = 1.0 / math.sqrt(dot(h, h))
         h, north = (k * h[0], k * h[1], k * h[2]), k * horizontal
-        r = mag_var / (weight * age_mag)
+        r = mag_var / age_mag * factor
         along, cov, scale, d = correct_field(along, cov, NO_CORRECTION, (h[0] - north, h[1], 0.0), north, h[2], r)
-        turn = heading_only(q, scale, d, additive)
-        q = multiply(turn, q)
+        q = heading_only(q, scale, d, additive)
         b = (b[0] + bias_update * d[3], b[1] + bias_update * d[4], b[2] + bias_update * d[5])
         age_mag = 0.0
         nis += d[6]

@@ -256,12 +256,12 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         r_acc, r_mag = 1e12, 1e12
         if has_acc:
             motion = linear_acceleration(motion, rotate(q, force), g, age_acc, motion_window)
-            r_acc = (acc_var + motion_time * motion) / (g * g * age_acc)
+            r_acc = (acc_var + motion_time * motion) * (1.0 / (g * g * age_acc))
             z[0], z[1], z[2] = force[0] / g, force[1] / g, force[2] / g
             age_acc = 0.0
         if has_mag:
-            u, weight, field = field_departure((p[7], p[8], p[9]), field, rotate(q, direction), age_mag)
-            r_mag = mag_var / (weight * age_mag)
+            u, factor, field = field_departure((p[7], p[8], p[9]), field, rotate(q, direction), age_mag)
+            r_mag = mag_var / age_mag * factor
             a = unit(direction)
             z[3], z[4], z[5] = a[0], a[1], a[2]
             age_mag = 0.0

@@ -87,13 +87,13 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         measured = euler.to_zyx(turn_about_down(heading_error(level, mag), level))
         angles = euler.to_zyx(q)
         motion = linear_acceleration(motion, rotate(q, acc), g, age, motion_window)
-        u, weight, field = field_departure((p[8], p[9], p[10]), field, rotate(level, mag), age)
+        u, factor, field = field_departure((p[8], p[9], p[10]), field, rotate(level, mag), age)
         if math.fabs(angles[1]) < p[14]:
             tilt = (acc_var + motion_time * motion) / (g * g * age)
             slope = dot(down_b(level), mag)
             square = max(dot(mag, mag) - slope * slope, 1e-12 * dot(mag, mag))
             slope2 = slope * slope / square
-            heading = mag_var * (1.0 + slope2) / (weight * age) + slope2 * tilt
+            heading = mag_var / age * (1.0 + slope2) * factor + slope2 * tilt
             c2 = math.cos(angles[1]) * math.cos(angles[1])
             r = (tilt / c2, tilt, heading + tilt * (1.0 - c2) / c2)
             residual = (

@@ -89,13 +89,13 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) ->
 
     if dot(mag, mag) > 0.0 and age_mag > 0.0:
         h = rotate(q, mag)
-        u, weight, field = field_departure((p[5], p[6], p[7]), field, h, age_mag)
+        u, factor, field = field_departure((p[5], p[6], p[7]), field, h, age_mag)
         north, down = p[11], p[12]
         if north != north:
             north, down = field_direction(field)
         h = unit(h)
         y = (h[0] - north, h[1], h[2] - down)
-        cov, d = correct_field(cov, d, y, north, down, p[4] / (weight * age_mag))
+        cov, d = correct_field(cov, d, y, north, down, p[4] / age_mag * factor)
         age_mag, dof = 0.0, 2.0
 
     has_acc = is_sample(acc)

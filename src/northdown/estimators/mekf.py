@@ -56,9 +56,9 @@ from northdown.kernels.kalman import (
     propagate_attitude_bias,
     symmetric3,
 )
-from northdown.kernels.quaternion import dot, multiply, normalize, rotate, scaled_axes
+from northdown.kernels.quaternion import dot, rotate, scaled_axes
 from northdown.kernels.runner import Kernel
-from northdown.kernels.so3 import exp
+from northdown.kernels.so3 import turn_body, turn_navigation
 from northdown.kernels.wahba import has_horizontal
 from northdown.kernels.weighting import field_departure, linear_acceleration
 
@@ -81,25 +81,25 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         cov = propagate_attitude_bias(
             cov, scaled_axes(dt, q), (gyr_var + scale_var * dot(rate, rate)) * dt, walk_var * dt
         )
-        q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
+        q = turn_body(q, (rate[0] * dt, rate[1] * dt, rate[2] * dt))
 
     d, dof = NO_CORRECTION, 0.0
     if is_sample(acc) and age_acc > 0.0:
         f = rotate(q, acc)
         motion = linear_acceleration(motion, f, g, age_acc, motion_window)
-        r = (acc_var + motion_time * motion) / (g * g * age_acc)
+        r = (acc_var + motion_time * motion) * (1.0 / (g * g * age_acc))
         cov, d = correct_tilt(cov, d, (f[0] / g, f[1] / g), r)
         age_acc = 0.0
         dof = 2.0
     h = rotate(q, mag)
     if has_horizontal(h) and age_mag > 0.0:
-        u, weight, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
+        u, factor, field = field_departure((norm_gate, dip_gate, window), field, h, age_mag)
         square = h[0] * h[0] + h[1] * h[1]
-        r = mag_var * (1.0 + h[2] * h[2] / square) / (weight * age_mag)
+        r = mag_var / age_mag * (1.0 + h[2] * h[2] / square) * factor
         cov, d = correct_north_down(cov, d, h[2] / math.sqrt(square), -1.0, math.atan2(h[1], h[0]), r)
         age_mag = 0.0
         dof += 1.0
-    q = multiply(exp((d[0], d[1], d[2])), q)  # of unit norm, and normalised at the next step
+    q = turn_navigation((d[0], d[1], d[2]), q)  # of unit norm, and normalised at the next step
     return q + (bx + d[3], by + d[4], bz + d[5]) + cov + (motion, age_acc, age_mag) + field + (u, d[6], dof)
 
 

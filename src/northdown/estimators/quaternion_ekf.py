@@ -76,19 +76,19 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     if has_acc:
         force = rotate(q, acc)
         motion = linear_acceleration(motion, force, g, age_acc, motion_window)
-        r_acc = (acc_var + motion_time * motion) / (g * g * age_acc)
+        r_acc = (acc_var + motion_time * motion) * (1.0 / (g * g * age_acc))
         k = 1.0 / g
         up = (k * force[0], k * force[1], k * force[2] + 1.0)
         age_acc = 0.0
     if has_mag:
         h = rotate(q, mag)
-        u, weight, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
+        u, factor, field = field_departure((p[8], p[9], p[10]), field, h, age_mag)
         north, down = p[14], p[15]
         if north != north:
             north, down = field_direction(field)
         h = unit(h)
         h = (h[0] - north, h[1], h[2] - down)
-        r_mag = mag_var / (weight * age_mag)
+        r_mag = mag_var / age_mag * factor
         age_mag = 0.0
 
     scale, d, dof = 0.0, NO_CORRECTION, 0.0

@@ -61,18 +61,23 @@ def conjugate(q: Quaternion) -> Quaternion:
 
 
 @inline
-def normalize(q: Quaternion) -> Quaternion:
-    """Quaternion of unit norm.
+def inverse_norm(q: Quaternion) -> float:
+    """1/‖q‖.
 
-    After a filter's step it is nearly unit already: there 1/√(1 + d) by its series, whose first neglected term
-    is under 0.25 d⁵ = 3e-21, is ready sooner than a square root and a division.
+    After a filter's step q is nearly of unit norm: there 1/√(1 + d) by its series, whose first neglected term is
+    under 0.25 d⁵ = 3e-21, is ready sooner than a square root and a division.
     """
     square = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
     d = square - 1.0
     if -1e-4 < d < 1e-4:
-        k = 1.0 - d * (0.5 - d * (0.375 - d * (0.3125 - d * 0.2734375)))
-    else:
-        k = 1.0 / math.sqrt(square)
+        return 1.0 - d * (0.5 - d * (0.375 - d * (0.3125 - d * 0.2734375)))
+    return 1.0 / math.sqrt(square)
+
+
+@inline
+def normalize(q: Quaternion) -> Quaternion:
+    """Quaternion of unit norm."""
+    k = inverse_norm(q)
     return (k * q[0], k * q[1], k * q[2], k * q[3])
 
 

@@ -34,14 +34,16 @@ def departure(norm_gate: float, dip_gate: float, horizontal: float, down: float,
     the part across it that of the dip: u = (along / gate₁)² + (across / gate₂)².
     """
     k = 1.0 / (horizontal * horizontal + down * down)
-    e = (k * (h * horizontal + z * down) - 1.0) / norm_gate
-    c = k * (z * horizontal - h * down) / dip_gate
+    e = (k * (h * horizontal + z * down) - 1.0) * (1.0 / norm_gate)
+    c = k * (z * horizontal - h * down) * (1.0 / dip_gate)
     return e * e + c * c
 
 
 @inline
 def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> Any:
-    """Departure u of the field from its reference, e⁻ᵘ, and the reference (horizontal, down, age) after this sample.
+    """Departure u of the field from its reference, eᵘ, and the reference (horizontal, down, age) after this sample.
+
+    A heading's variance grows by eᵘ.
 
     u is that of `departure`, at most 60, and nothing in the first second. The reference is the mean of all samples so
     far, each with weight e⁻ᵘ, forgotten with the time constant `window`.
@@ -54,9 +56,9 @@ def field_departure(gates: Any, reference: Any, field_n: Vector, dt: float) -> A
     if square == 0.0:
         return 0.0, 1.0, (h, z, age)
     u = min(60.0, departure(norm_gate, dip_gate, horizontal, down, h, z)) * min(1.0, max(0.0, age / LEARN - 1.0))
-    weight = math.exp(-u)
-    k = weight * dt / min(age, window + dt)
-    return u, weight, (horizontal + k * (h - horizontal), down + k * (z - down), age)
+    factor = math.exp(u)
+    k = dt / (factor * min(age, window + dt))
+    return u, factor, (horizontal + k * (h - horizontal), down + k * (z - down), age)
 
 
 @inline
