@@ -1,6 +1,6 @@
 """The calibrating filter against VQF: accuracy, ablations, coverage, cross-validation and time, in one run.
 
-    python benchmarks/flagship.py [--root DIR] [--part accuracy,ablation,coverage,time,cross]
+    python benchmarks/flagship.py [--root DIR] [--part accuracy,ablation,coverage,iron,time,cross]
                                   [--seconds 2400] [--json FILE]
 
 One set of parameters for everything. `cross` chooses the parameters anew for each trial that is left out, from the
@@ -27,10 +27,11 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial.transform import Rotation
 
+import _bands
 import _peers
 import _timing
 import northdown as nd
-from northdown.evaluation import AttitudeError
+from northdown.evaluation import AttitudeError, ClockOffset
 
 CLIPPED = ("Test05", "Test10")
 # Some reference samples of these trials are plainly wrong (errors of up to 130° that every method shares).
@@ -92,13 +93,13 @@ class Trial:
     index: np.ndarray
     truth: np.ndarray
 
-    def error(self, estimate: nd.Orientation) -> AttitudeError:
+    def error(self, estimate: nd.Orientation, clock: ClockOffset | str = "as recorded") -> AttitudeError:
         """Error, aligned to this estimate; of trials with a spoiled reference without those samples."""
         mask = None
         if any(bad in self.name for bad in BAD_REFERENCE):
             mask = np.zeros(len(estimate), bool)
             mask[self.index] = True
-        return nd.attitude_error(estimate, self.recording, mask=mask)
+        return nd.attitude_error(estimate, self.recording, mask=mask, clock=clock)
 
     def total(self, estimate: nd.Orientation) -> float:
         """Total RMSE, degrees, of an estimate in NED by `truth`: quick, for searches."""
@@ -174,12 +175,39 @@ def table(title: str, first: str, columns: list[str], rows: dict[str, list[str]]
 
 
 def accuracy(trials: list[Trial]) -> dict[str, object]:
-    results = {name: np.array([figures(t.error(m(t.recording))) for t in trials]) for name, m in methods().items()}
+    offsets = [nd.clock_offset(t.recording) for t in trials]
+    results, aligned = {}, {}
+    for name, method in methods().items():
+        estimates = [method(t.recording) for t in trials]
+        results[name] = np.array([figures(t.error(e)) for t, e in zip(trials, estimates, strict=True)])
+        aligned[name] = np.array(
+            [figures(t.error(e, clock)) for t, e, clock in zip(trials, estimates, offsets, strict=True)]
+        )
     rows = {t.name: ["{:.2f} ({:.2f}, {:.2f})".format(*results[m][k]) for m in results] for k, t in enumerate(trials)}
     for name in means(trials, np.zeros((len(trials), 3))):
         rows[f"mean {name}"] = ["{:.3f} ({:.3f}, {:.3f})".format(*means(trials, v)[name]) for v in results.values()]
-    table("RMSE total (heading, inclination), degrees", "trial", list(results), rows)
-    return {m: {t.name: list(v[k]) for k, t in enumerate(trials)} for m, v in results.items()}
+    table("RMSE total (heading, inclination), degrees, clocks as recorded", "trial", list(results), rows)
+    rows = {}
+    for name in means(trials, np.zeros((len(trials), 3))):
+        rows[f"mean {name}"] = ["{:.3f} ({:.3f}, {:.3f})".format(*means(trials, v)[name]) for v in aligned.values()]
+    table("The same with clocks aligned, each trial by its own offset, all methods alike", "of", list(aligned), rows)
+    clocks(trials, offsets)
+    errors = {m: {t.name: list(v[k]) for k, t in enumerate(trials)} for m, v in results.items()}
+    errors |= {f"{m}, clocks aligned": {t.name: list(v[k]) for k, t in enumerate(trials)} for m, v in aligned.items()}
+    return errors | {"clock offset": {t.name: [c.offset, c.sigma] for t, c in zip(trials, offsets, strict=True)}}
+
+
+def clocks(trials: list[Trial], offsets: list[ClockOffset]) -> None:
+    """What the offsets of the trials have in common: of one system they should be the same."""
+    rows = {t.name: [f"{1e3 * c.offset:+.3f}", f"{1e3 * c.sigma:.3f}"] for t, c in zip(trials, offsets, strict=True)}
+    for data, chosen in (("BROAD", True), ("RepoIMU", False)):
+        found = np.array(
+            [(c.offset, c.sigma) for t, c in zip(trials, offsets, strict=True) if chosen == (t.group != "RepoIMU")]
+        )
+        if len(found) > 1:
+            mean, scatter = 1e3 * found[:, 0].mean(), 1e3 * found[:, 0].std(ddof=1)
+            rows[f"mean {data}"] = [f"{mean:+.3f}", f"{scatter:.3f} (scatter)"]
+    table("Gyroscope behind the reference, ms", "trial", ["offset", "sigma"], rows)
 
 
 def ablation(trials: list[Trial]) -> dict[str, object]:
@@ -200,22 +228,77 @@ def _totals(filter_: nd.CalibratingEKF, trial: Trial) -> tuple[float, float]:
     return trial.total(filter_.run(r, frame="NED")), trial.total(filter_.smooth(r, frame="NED"))
 
 
-def coverage(trials: list[Trial]) -> dict[str, object]:
-    rows, found = {}, {}
-    for t in trials:
-        shares = []
-        for run in (ours().run, ours().smooth):
-            estimate = run(t.recording)
-            error = t.error(estimate)
-            sigma = np.sqrt(np.einsum("nii->ni", estimate.covariance[error.index]))
-            shares.append(100.0 * (np.abs(error.rotvec) < 3.0 * sigma).mean(axis=0))
-        rows[t.name] = [f"{s[0]:.1f}  {s[1]:.1f}  {s[2]:.1f}" for s in shares]
-        found[t.name] = [list(s) for s in shares]
-    table("Share of samples within 3σ, %: x, y (tilt), z (heading)", "trial", ["real time", "smoothed"], rows)
-    values = np.array(list(found.values()))
-    within = ((values >= 95.0) & (values <= 99.9)).sum(), (values < 95.0).sum(), (values > 99.9).sum()
-    console.print("of {} shares, {} from 95 to 99.9 %, {} below, {} above".format(values.size, *within))
+BANDS = {"filter": {}, "heading": {"heading_sigma": 1.0}, "time": {"time_sigma": 1.0}}
+NOTHING = {"inflation": 1.0, "tilt_sigma": 0.0, "heading_sigma": 0.0, "time_sigma": 0.0}
+
+
+def bands(trial: Trial, recording: nd.Recording | None = None) -> list[_bands.Band]:
+    """In real time and smoothed; of another recording than the trial's own if given."""
+    found = []
+    for run in ("run", "smooth"):
+        squares: dict[str, np.ndarray] = {}
+        for part, changed in BANDS.items():
+            estimate = getattr(ours(**(NOTHING | changed)), run)(recording or trial.recording)
+            error = trial.error(estimate)
+            squares[part] = np.einsum("nii->ni", estimate.covariance[error.index])
+        heading, late = (squares[part] - squares["filter"] for part in ("heading", "time"))
+        found.append(_bands.Band(error.rotvec, squares["filter"], heading, late))
     return found
+
+
+def defaults() -> tuple[float, ...]:
+    return tuple(getattr(ours(), name) for name in _bands.GRID)
+
+
+def coverage(trials: list[Trial]) -> dict[str, object]:
+    """Shares within three sigmas: by trial, over the samples of all, and with constants chosen without the trial."""
+    all_bands = [bands(t) for t in trials]
+    repo = np.array([t.group == "RepoIMU" for t in trials])
+    good = np.array([not any(bad in t.name for bad in BAD_REFERENCE) for t in trials])
+    groups = {"all samples, BROAD": ~repo, "all samples, RepoIMU 02, 04, 07, 08": repo & good}
+    groups = {name: mask for name, mask in groups.items() if mask.any()}
+    values = np.array([[b.share(*defaults()) for b in pair] for pair in all_bands])
+    columns = ["real time", "smoothed"]
+    pooled = _bands.pooled(all_bands, values, groups)
+    rows = {t.name: _bands.words(v) for t, v in zip(trials, values, strict=True)}
+    rows |= {name: _bands.words(v) for name, v in pooled.items()}
+    table("Share of samples within 3σ, %: x, y (tilt), z (heading)", "trial", columns, rows)
+    console.print("of {} shares, {} from 95 to 99.9 %, {} below, {} above".format(values.size, *_bands.count(values)))
+    chosen = _bands.chosen_without(all_bands, groups)
+    left = np.array([[b.share(*c) for b in pair] for c, pair in zip(chosen, all_bands, strict=True)])
+    rows = {
+        f"{t.name}: {', '.join(f'{n} {v:g}' for n, v in zip(_bands.GRID, c, strict=True))}": _bands.words(v)
+        for t, c, v in zip(trials, chosen, left, strict=True)
+        if c != defaults()
+    }
+    rows |= {name: _bands.words(v) for name, v in _bands.pooled(all_bands, left, groups).items()}
+    table("The same, constants chosen without the trial; trials for which they differ", "over", columns, rows)
+    console.print("of {} shares, {} from 95 to 99.9 %, {} below, {} above".format(left.size, *_bands.count(left)))
+    found = {t.name: v.tolist() for t, v in zip(trials, values, strict=True)}
+    return found | {name: v.tolist() for name, v in pooled.items()} | {"left out": left.tolist()}
+
+
+def iron(trials: list[Trial], draws: int = 3) -> dict[str, object]:
+    """Heading band of BROAD's trials with iron on the body that they do not have: 1 µT (1σ) on each axis."""
+    rng = np.random.default_rng(1)
+    found: dict[str, list[tuple[float, float, float, float]]] = {"real time": [], "smoothed": []}
+    for trial in (t for t in trials if t.group != "RepoIMU"):
+        for _ in range(draws):
+            magnetic = dataclasses.replace(trial.recording, mag=trial.recording.mag + rng.normal(0.0, 1.0, 3))
+            for way, band in zip(found, bands(trial, magnetic), strict=True):
+                error, sigma = np.rad2deg(band.error[:, 2]), np.rad2deg(np.sqrt(band.variance(*defaults())[:, 2]))
+                share = 100.0 * float((np.abs(error) < 3.0 * sigma).mean())
+                found[way].append((len(error), share, float(np.mean(error**2)), float(np.mean(sigma**2))))
+    rows = {}
+    for way, values in found.items():
+        size, share, error2, sigma2 = np.array(values).T
+        alike = np.corrcoef(np.sqrt(error2), np.sqrt(sigma2))[0, 1]
+        cells = (np.average(share, weights=size), np.sqrt(error2.mean()), np.sqrt(sigma2.mean()), alike)
+        rows[way] = ["{:.1f}", "{:.2f}", "{:.2f}", "{:.2f}"]
+        rows[way] = [text.format(v) for text, v in zip(rows[way], cells, strict=True)]
+    columns = ["within 3σ, %", "RMS error, °", "RMS σ, °", "correlation of both over the runs"]
+    table("Heading with iron on the body", "BROAD", columns, rows)
+    return dict(found)
 
 
 def step(name: str, value: float, direction: int) -> float:
@@ -325,7 +408,7 @@ def main() -> int:
     """Run the parts asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, default=os.environ.get("NORTHDOWN_DATA"), help="default: NORTHDOWN_DATA")
-    parser.add_argument("--part", default="accuracy,ablation,coverage,time,cross", metavar="NAMES")
+    parser.add_argument("--part", default="accuracy,ablation,coverage,iron,time,cross", metavar="NAMES")
     parser.add_argument("--seconds", type=float, default=2400.0, help="most time for each cross-validation")
     parser.add_argument("--json", metavar="FILE", type=Path, help="also write the figures there")
     options = parser.parse_args()
@@ -336,6 +419,7 @@ def main() -> int:
         "accuracy": accuracy,
         "ablation": ablation,
         "coverage": coverage,
+        "iron": iron,
         "cross": lambda trials: cross(trials, options.seconds, tuple(START), relative=True),
         "cross-degrees": lambda trials: cross(trials, options.seconds, tuple(START)),
         "cross-few": lambda trials: cross(trials, options.seconds, FEW, greedy=True),

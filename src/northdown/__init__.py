@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     from northdown.estimators.tilt_compass import TiltCompass
     from northdown.estimators.triad import Triad
     from northdown.estimators.vqf import VQF
-    from northdown.evaluation import align, attitude_error, observability
+    from northdown.evaluation import align, attitude_error, clock_offset, observability
     from northdown.io import read, read_array, read_orientation, write_array, write_orientation, write_recording
     from northdown.navigation import Trajectory, navigate
     from northdown.simulation import simulate, simulate_array
@@ -105,6 +105,7 @@ __all__ = [
     "arrays",
     "attitude_error",
     "calibration",
+    "clock_offset",
     "datasets",
     "estimators",
     "evaluation",
@@ -143,6 +144,7 @@ _HOMES = {
     "Trajectory": "navigation",
     "align": "evaluation",
     "attitude_error": "evaluation",
+    "clock_offset": "evaluation",
     "navigate": "navigation",
     "observability": "evaluation",
     "read": "io",

@@ -125,3 +125,32 @@ def test_offline_adds_those_that_smooth(run, csv):
     assert result.code == 0
     names = [e["name"] for e in json.loads(result.out)["estimators"]]
     assert sorted(names) == ["mahony", "vqf", "vqf (offline)"]
+
+
+def test_clocks_aligned_on_request_only(run, recording, tmp_path):
+    # the truth 30 ms early is a gyroscope 30 ms late
+    reference = recording.reference
+    early = dataclasses.replace(reference, time=reference.time - 0.03)
+    path = tmp_path / "late.hdf5"
+    nd.write_recording(dataclasses.replace(recording, reference=early), path)
+    plain = json.loads(run("compare", path, "-e", "mekf", "--json").out)
+    assert plain["clock_offset"] is None
+    value = json.loads(run("compare", path, "-e", "mekf", "--align-clock", "--json").out)
+    found = value["clock_offset"]
+    assert abs(found["offset_s"] - 0.03) < 4.0 * found["sigma_s"]
+    assert found["sigma_s"] < 1e-3
+    before, after = (v["estimators"][0]["total_rms_deg"] for v in (plain, value))
+    assert after < before
+    text = " ".join(run("compare", path, "-e", "mekf", "--align-clock").out.split())
+    assert f"clocks aligned (gyroscope {1e3 * found['offset_s']:.3f} ± " in text
+    assert "ms behind the reference)" in text
+    assert "clocks" not in run("compare", path, "-e", "mekf").out
+
+
+def test_clocks_cannot_be_aligned_without_reference_or_motion(run, recording, tmp_path):
+    bare = tmp_path / "bare.csv"
+    nd.write_recording(dataclasses.replace(recording, reference=None), bare)
+    assert "with a reference, for --align-clock" in run("compare", bare, "--align-clock").error
+    still = tmp_path / "still.csv"
+    nd.write_recording(nd.simulate(10.0, motion="rest", rate=50.0), still)
+    assert "to find the offset of the clocks" in run("compare", still, "--align-clock").error

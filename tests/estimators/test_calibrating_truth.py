@@ -47,7 +47,7 @@ class Dense:
         self.motion = self.clock = self.age_acc = self.age_mag = self.learnt = self.mean_u = 0.0
         self.reference = np.zeros(2)
         self.turned, self.history = np.zeros(3), [(0.0, np.zeros(3))]
-        self.still, self.blocks, self.epochs = False, [], []
+        self.still, self.blocks, self.epochs, self.seen = False, [], [], []
         self.begin()
 
     def begin(self):
@@ -169,6 +169,8 @@ class Dense:
             u = max(u, self.mean_u)
         self.u = u
 
+        self.seen.append((age / (1.0 + u) ** f.gate_power, self.R, h))
+
         def angle(v):
             return math.atan2(v[1], v[0])
 
@@ -179,6 +181,21 @@ class Dense:
             H[j] = -derivative(lambda e, axis=axis: angle(Rotation.from_rotvec(e * axis).apply(h)))
         H[DELAY] = -derivative(lambda e: angle(h + e * slope))
         return H, angle(h), f.mag_noise**2 / age * (1.0 + u) ** f.gate_power
+
+    def heading_doubt(self):
+        """By stacked least squares for the field of the place and that of the body, with 0.1 s of no iron."""
+        rows = [math.sqrt(w) * np.hstack([np.eye(3), R]) for w, R, _ in self.seen]
+        rows = np.vstack([*rows, math.sqrt(0.1) * np.hstack([np.zeros((3, 3)), np.eye(3)])])
+        fields = np.concatenate([*(math.sqrt(w) * m for w, _, m in self.seen), np.zeros(3)])
+        iron = np.linalg.lstsq(rows, fields, rcond=None)[0][3:]
+        weight = np.array([w for w, *_ in self.seen])
+        R = np.average([R for _, R, _ in self.seen], axis=0, weights=weight)
+        x, y, _ = np.average([m for *_, m in self.seen], axis=0, weights=weight)
+        across = np.array([-y, x, 0.0]) / math.hypot(x, y)
+        psi = across @ R @ iron / math.hypot(x, y)
+        spread = 0.1 * np.linalg.inv(rows.T @ rows)[3:, 3:]
+        d = across @ R @ spread @ R.T @ across
+        return self.f.heading_sigma**2 * (max(0.04, d) + (psi / 0.01) ** 2)
 
     def window(self):
         self.blocks.append(np.array(self.block).reshape(-1, 7))
@@ -254,7 +271,9 @@ def test_agrees_with_a_dense_implementation(recording, parameters):
         P = state[layout.COV : layout.COV + 22 * 24].reshape(22, 24)[:, :22]
         scale = np.sqrt(np.outer(np.diag(dense.P), np.diag(dense.P)))
         assert np.abs((P - dense.P) / scale).max() < 1e-6
-    floor = np.diag([f.tilt_sigma, f.tilt_sigma, f.heading_sigma]) ** 2 + f.time_sigma**2 * np.outer(rate, rate)
+    floor = np.diag([f.tilt_sigma**2, f.tilt_sigma**2, dense.heading_doubt()]) + f.time_sigma**2 * np.outer(
+        rate, rate
+    )
     expected = f.inflation**2 * dense.P[:3, :3] + floor
     # the rate that is reported is that of before the last correction: 1e-3 of it at most
     assert np.allclose(result.covariance[last], expected, rtol=1e-3, atol=1e-9)

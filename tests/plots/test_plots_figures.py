@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from northdown import plots
 from northdown.errors import InputError
-from northdown.evaluation import attitude_error
+from northdown.evaluation import ClockOffset, attitude_error
 from northdown.orientation import Orientation
 from northdown.plots import _canvas, _lines
 from northdown.recording import Recording
@@ -111,6 +111,12 @@ def test_error_panels_show_the_errors() -> None:
         np.testing.assert_allclose(ax.lines[0].get_ydata(), np.rad2deg(value), atol=1e-12)
         np.testing.assert_allclose(ax.lines[0].get_xdata(), error.time)
     assert labels(figure) == [f"filter: RMSE {error.rmse().total_deg:.2f}°"]
+    assert "clocks" not in figure.legends[0].get_title().get_text()
+
+
+def test_error_title_says_that_clocks_were_aligned() -> None:
+    error = attitude_error(estimate(), motion(), clock=ClockOffset(0.002, 1e-4, 100))
+    assert plots.errors(error).legends[0].get_title().get_text().endswith(", clocks aligned")
 
 
 def test_angles_are_those_of_the_orientation() -> None:

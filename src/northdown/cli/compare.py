@@ -12,8 +12,10 @@ from northdown.cli.output import FIGURE_SUFFIXES, check_target
 from northdown.cli.reading import Reading, reads_recording
 from northdown.cli.runs import MOST_CURVES, Run, error_table, remarks, run_all
 from northdown.cli.selection import all_for, check_sensors, named
+from northdown.errors import InputError, expected
 
 if TYPE_CHECKING:
+    from northdown.evaluation import ClockOffset
     from northdown.recording import Recording
 
 
@@ -28,6 +30,10 @@ def compare(
     ] = [],  # noqa: B006  (typer copies it)
     offline: Annotated[
         bool, typer.Option("--offline", help="Also the estimators that can use the whole recording for each sample.")
+    ] = False,
+    align_clock: Annotated[
+        bool,
+        typer.Option("--align-clock", help="Take out the offset between the gyroscope's clock and the reference's."),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Write JSON instead of a table.")] = False,
     plot: Annotated[
@@ -45,6 +51,7 @@ def compare(
         check_target("--plot", plot, source=reading.source, suffixes=FIGURE_SUFFIXES)
     longest = gate.read_max_gap(max_gap)
     recording = reading.load()
+    offset = find_offset(recording) if align_clock else None
     left_out: list[str] = []
     if wanted:
         for chosen in wanted:
@@ -52,14 +59,14 @@ def compare(
     else:
         wanted, left_out = all_for(recording)
     gate.admit(recording, wanted, max_gap=longest, force=force)
-    runs = run_all(recording, wanted, max_gap=longest, offline=offline)
+    runs = run_all(recording, wanted, max_gap=longest, offline=offline, clock=offset)
     remarks(runs)
     if plot is not None:
         _draw(recording, runs, plot)
     if json:
-        console.write_json(as_dict(recording, runs, left_out))
+        console.write_json(as_dict(recording, runs, left_out, offset))
         return
-    console.paragraph(f"{recording.name or 'standard input'}: {headline(recording, runs)}.")
+    console.paragraph(f"{recording.name or 'standard input'}: {headline(recording, runs, offset)}.")
     print()
     error_table(runs, end_heading=recording.reference is None)
     if left_out:
@@ -68,7 +75,17 @@ def compare(
         print(console.one_line(f"Written: {plot}"))
 
 
-def headline(recording: Recording, runs: list[Run]) -> str:
+def find_offset(recording: Recording) -> ClockOffset:
+    """Offset between the clocks of gyroscope and reference; an error where there is nothing to find it from."""
+    from northdown.evaluation import clock_offset
+
+    if recording.reference is None:
+        got, do = f"{recording.name or 'one'} without", "leave out --align-clock"
+        raise InputError(expected("a recording with a reference, for --align-clock", got, do=do))
+    return clock_offset(recording)
+
+
+def headline(recording: Recording, runs: list[Run], offset: ClockOffset | None = None) -> str:
     """What the numbers of the table are."""
     errors = [run.error for run in runs if run.error is not None]
     if recording.reference is None:
@@ -83,10 +100,13 @@ def headline(recording: Recording, runs: list[Run]) -> str:
         "rotations": ", each after aligning world and body axes, so they are lower bounds",
     }[kind]
     still = " (the moving ones)" if recording.movement is not None else ""
-    return f"RMS errors to the reference over {len(errors[0])} of {len(recording)} samples{still}{what}"
+    clocks = "" if offset is None else f", clocks aligned ({offset})"
+    return f"RMS errors to the reference over {len(errors[0])} of {len(recording)} samples{still}{what}{clocks}"
 
 
-def as_dict(recording: Recording, runs: list[Run], left_out: list[str]) -> dict[str, Any]:
+def as_dict(
+    recording: Recording, runs: list[Run], left_out: list[str], offset: ClockOffset | None = None
+) -> dict[str, Any]:
     """The comparison for programs; angles in degrees."""
     has_reference = recording.reference is not None
     return {
@@ -95,6 +115,7 @@ def as_dict(recording: Recording, runs: list[Run], left_out: list[str]) -> dict[
         "duration": recording.duration,
         "compared_with": "reference" if has_reference else next(r.name for r in runs if r.orientation is not None),
         "alignment": recording.reference_offset if has_reference else None,
+        "clock_offset": None if offset is None else {"offset_s": offset.offset, "sigma_s": offset.sigma},
         "movement_only": has_reference and recording.movement is not None,
         "estimators": [_run_as_dict(run) for run in runs],
         "left_out": left_out,

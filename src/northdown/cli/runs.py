@@ -14,7 +14,7 @@ from northdown.errors import InputError
 if TYPE_CHECKING:
     from northdown.checks import Finding
     from northdown.estimators import Estimator
-    from northdown.evaluation import AttitudeError
+    from northdown.evaluation import AttitudeError, ClockOffset
     from northdown.orientation import Orientation
     from northdown.recording import Recording
 
@@ -48,11 +48,16 @@ class Run:
 
 
 def run_all(
-    recording: Recording, estimators: Sequence[type[Estimator]], *, max_gap: float, offline: bool = False
+    recording: Recording,
+    estimators: Sequence[type[Estimator]],
+    *,
+    max_gap: float,
+    offline: bool = False,
+    clock: ClockOffset | None = None,
 ) -> list[Run]:
     """Run estimators with their default parameters; best first where there is a reference.
 
-    With `offline`, those that smooth do so too.
+    With `offline`, those that smooth do so too. `clock` is taken out of all errors to the reference.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def run_all(
         for name in names:
             first = next((r.orientation for r in runs if r.orientation is not None), None)
             try:
-                runs.append(_run(name, ways[name], recording, first))
+                runs.append(_run(name, ways[name], recording, first, clock))
             except InputError as problem:
                 runs.append(Run(name, problem=str(problem)))
     if runs and all(run.orientation is None for run in runs):
@@ -80,7 +85,13 @@ def run_all(
     return runs
 
 
-def _run(name: str, way: Callable[[Recording], Orientation], recording: Recording, first: Orientation | None) -> Run:
+def _run(
+    name: str,
+    way: Callable[[Recording], Orientation],
+    recording: Recording,
+    first: Orientation | None,
+    clock: ClockOffset | None,
+) -> Run:
     from northdown.evaluation import attitude_error
 
     # compile, or load the compiled code, outside of what is timed
@@ -90,7 +101,7 @@ def _run(name: str, way: Callable[[Recording], Orientation], recording: Recordin
     nanoseconds = (time.perf_counter_ns() - begin) / max(len(recording), 1)
     try:
         if recording.reference is not None:
-            error = attitude_error(orientation, recording)
+            error = attitude_error(orientation, recording, clock=clock or "as recorded")
         else:
             error = attitude_error(orientation, orientation if first is None else first)
     except InputError as problem:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from northdown.estimators._calibrating_iron import forget_iron, look_for_iron
 from northdown.estimators._calibrating_layout import (
     ACC_SQUARE,
     AGE_MAG,
@@ -270,6 +271,8 @@ def _take_heading(p: Any, s: Any) -> None:
             s[NEW_FIELD + 2] = 0.0
     s[FIELD] += gain * (h - s[FIELD])
     s[FIELD + 1] += gain * (z - s[FIELD + 1])
+    if s[FIELD + 2] != learnt:  # another field has become the reference
+        forget_iron(s)
     # A disturbed field has the norm and the dip of the reference now and then, by chance.
     if p.gate_window > 0.0:
         s[MEAN_DEPARTURE] += min(1.0, age / p.gate_window) * (u - s[MEAN_DEPARTURE])
@@ -286,7 +289,9 @@ def _take_heading(p: Any, s: Any) -> None:
     add_row(s, gain_row, hx, COV)
     add_row(s, gain_row, hy, COV + WIDTH)
     add_row(s, gain_row, lag, COV + DELAY * WIDTH)
-    r = p.mag / age * (1.0 + u) ** p.gate_power
+    doubt = (1.0 + u) ** p.gate_power
+    r = p.mag / age * doubt
+    look_for_iron(s, (x, y, z), age / doubt)
     variance = hx * s[gain_row] + hy * s[gain_row + 1] - s[gain_row + 2] + lag * s[gain_row + DELAY] + r
     known = hx * s[ERROR] + hy * s[ERROR + 1] - s[ERROR + 2] + lag * s[ERROR + DELAY]
     _take(s, 3, variance, math.atan2(y, x) - known)

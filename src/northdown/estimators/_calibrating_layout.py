@@ -64,8 +64,13 @@ BLOCK_HEAD: Final = RING + 4 * N_RING
 BLOCKS: Final = BLOCK_HEAD + 1
 N_BLOCKS: Final = 64
 
+# What the field says of iron on the body: sums, and what follows from them.
+IRON: Final = BLOCKS + N_BLOCKS * N_BLOCK
+IRON_TURN: Final = IRON + 16  # heading by which it would turn the field on average
+IRON_KNOWN: Final = IRON_TURN + 1  # part of the variance of that heading that is no longer open
+
 # Seven scalar measurements of an epoch: velocity, heading, rest. Of each 1/S (0: not taken) and y/S.
-TAKEN: Final = BLOCKS + N_BLOCKS * N_BLOCK
+TAKEN: Final = IRON_KNOWN + 1
 HEADING_SLOPE: Final = TAKEN + 14  # derivatives of the heading with respect to tilt x, tilt y and delay
 GAINS: Final = -(-(HEADING_SLOPE + 3) // 8) * 8
 ERROR: Final = GAINS + 7 * WIDTH

@@ -100,7 +100,9 @@ class CalibrationParameters(Estimator):
     tilt_sigma : float
         Least standard deviation of tilt that is reported, rad. Raising it widens the band.
     heading_sigma : float
-        Least standard deviation of heading that is reported, rad. Raising it widens the band.
+        Standard deviation of heading from iron on the body that the recording does not show yet, rad. It falls to a
+        fifth once the body has turned enough to show none; what it does show adds as much for each 0.01 rad by which
+        it would turn the heading. Raising it widens the band.
     time_sigma : float
         Standard deviation of the moment for which an attitude stands, s. Raising it widens the bands in fast motion.
     """
@@ -137,10 +139,10 @@ class CalibrationParameters(Estimator):
     start_tilt: float = parameter(0.05, unit="rad", above=0.0)
     start_heading: float = parameter(0.2, unit="rad", above=0.0)
     start_bias: float = parameter(0.02, unit="rad/s", above=0.0)
-    inflation: float = parameter(2.0, above=0.0)
+    inflation: float = parameter(1.0, above=0.0)
     tilt_sigma: float = parameter(0.003, unit="rad", low=0.0)
     heading_sigma: float = parameter(0.015, unit="rad", low=0.0)
-    time_sigma: float = parameter(0.0025, unit="s", low=0.0)
+    time_sigma: float = parameter(0.0015, unit="s", low=0.0)
 
     def _terms(self) -> Terms:
         return Terms(

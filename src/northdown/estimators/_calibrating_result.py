@@ -6,6 +6,7 @@ import math
 from typing import Any, Final
 
 from northdown.estimators._calibrating_epoch import clear_sums
+from northdown.estimators._calibrating_iron import forget_iron, heading_doubt
 from northdown.estimators._calibrating_layout import (
     ATTITUDE,
     BIAS,
@@ -33,8 +34,11 @@ START_SPEED: Final = 0.1  # m/s, standard deviation of the velocity that the fir
 
 
 @inline
-def covariance_of(t: Terms, p: Any, rate_n: Any) -> Any:
-    """Covariance that is reported, nine entries by rows, for that of the filter (upper triangle) and the rate."""
+def covariance_of(t: Terms, p: Any, rate_n: Any, doubt: float) -> Any:
+    """Covariance that is reported, nine entries by rows, for that of the filter (upper triangle) and the rate.
+
+    `doubt` is the variance of `heading_doubt`.
+    """
     x, y, z = rate_n
     k, f = t.inflation, t.time_floor
     return symmetric3(
@@ -43,7 +47,7 @@ def covariance_of(t: Terms, p: Any, rate_n: Any) -> Any:
         k * p[2] + f * x * z,
         k * p[3] + t.tilt_floor + f * y * y,
         k * p[4] + f * y * z,
-        k * p[5] + t.heading_floor + f * z * z,
+        k * p[5] + doubt + f * z * z,
     )
 
 
@@ -63,6 +67,7 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
     s[COV + DIAGONAL] = t.start_tilt
     s[COV + 2 * DIAGONAL] = t.start_heading if heading_known else math.pi * math.pi / 3.0
     clear_sums(s)
+    forget_iron(s)
     return s
 
 
@@ -82,7 +87,7 @@ def output(p: Any, s: Any) -> Any:
     row = COV + WIDTH
     p_upper = (s[COV], s[COV + 1], s[COV + 2], s[row + 1], s[row + 2], s[row + WIDTH + 2])
     rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
-    covariance = covariance_of(t, p_upper, rate_n)
+    covariance = covariance_of(t, p_upper, rate_n, heading_doubt(t, s))
     at = COV + BIAS * DIAGONAL
     sigma = (math.sqrt(s[at]), math.sqrt(s[at + DIAGONAL]), math.sqrt(s[at + 2 * DIAGONAL]))
     q = ahead(t, (s[0], s[1], s[2], s[3]), rate_n)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from northdown.estimators._calibrating_back import back
 from northdown.estimators._calibrating_forth import AFTER, BEFORE, END, N_RECORD, NOMINAL_BIAS, RATE_N, forth
+from northdown.estimators._calibrating_iron import heading_doubt
 from northdown.estimators._calibrating_layout import (
     COV,
     Terms,
@@ -76,11 +77,14 @@ def smooth(
         jump[:] = 1.0, 0.0, 0.0, 0.0
     smoothed = np.empty((kept, 18))
     back()(records[:kept], smoothed)
-    spread()(work.params, work.turn, time, records[:kept], smoothed, out)
+    doubt = heading_doubt(Terms(*work.params[:N_TERMS]), work.state[N_RUNNER:])
+    spread()(work.params, work.turn, doubt, time, records[:kept], smoothed, out)
     return flags, out
 
 
-def _spread(params: Array, turn: Array, time: Array, records: Array, smoothed: Array, out: Array) -> None:
+def _spread(
+    params: Array, turn: Array, doubt: float, time: Array, records: Array, smoothed: Array, out: Array
+) -> None:
     """Correct every sample: between two epochs the correction goes evenly from the one's to the other's."""
     n = len(time)
     p = to_fixed_tuple(params, N_TERMS)
@@ -108,18 +112,20 @@ def _spread(params: Array, turn: Array, time: Array, records: Array, smoothed: A
         first = start if k == 0 else start + 1
         for i in range(first, end + 1):
             u = (time[i] - time[start]) / span if span > 0.0 else 1.0
-            _write_sample(p, f, axes, last, following, u, i == end, corrected, out[i])
+            _write_sample(p, f, axes, doubt, last, following, u, i == end, corrected, out[i])
         for j in range(3):
             last[j] = smoothed[k, j]
         for j in range(3, 18):
             last[j] = following[j]
         start = end
     for i in range(start if len(records) == 0 else start + 1, n):
-        _write_sample(p, f, axes, last, last, 0.0, False, f, out[i])
+        _write_sample(p, f, axes, doubt, last, last, 0.0, False, f, out[i])
 
 
 @inline
-def _write_sample(p: Any, f: Any, axes: Any, a: Array, b: Array, u: float, at_end: bool, end: Any, to: Array) -> None:
+def _write_sample(
+    p: Any, f: Any, axes: Any, doubt: float, a: Array, b: Array, u: float, at_end: bool, end: Any, to: Array
+) -> None:
     d = (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * (b[2] - a[2]))
     q = end if at_end else multiply(exp(d), (to[0], to[1], to[2], to[3]))
     terms, rate_n = Terms(*p), (to[RATE_N], to[RATE_N + 1], to[RATE_N + 2])
@@ -137,13 +143,13 @@ def _write_sample(p: Any, f: Any, axes: Any, a: Array, b: Array, u: float, at_en
         a[11] + u * (b[11] - a[11]),
         a[14] + u * (b[14] - a[14]),
     )
-    c = congruent(axes, covariance_of(terms, upper, rate_n))
+    c = congruent(axes, covariance_of(terms, upper, rate_n, doubt))
     for j in range(9):
         to[7 + j] = c[j]
 
 
 @cache
 def spread() -> Callable[..., None]:
-    """Compiled ``spread(params, turn, time, records, smoothed, out)``."""
-    signature = (_VECTOR, _VECTOR, _TIMES, _ARRAY, _ARRAY, _ARRAY)
+    """Compiled ``spread(params, turn, doubt, time, records, smoothed, out)``."""
+    signature = (_VECTOR, _VECTOR, numba.float64, _TIMES, _ARRAY, _ARRAY, _ARRAY)
     return compiled(_spread, "calibrating-spread", signature)

@@ -70,17 +70,18 @@ what it misses by.
 
 Covariance
 ----------
-The filter's own P would hold if all errors were white. What is reported is
+The filter's own P would hold if all errors were white and all of the model. What is reported is
 
 .. math::
 
-    \kappa^2 P_{\theta\theta} + \operatorname{diag}(\sigma_t^2, \sigma_t^2, \sigma_h^2)
-    + \sigma_\tau^2\, (\hat R\omega)(\hat R\omega)^T
+    \kappa^2 P_{\theta\theta} + \operatorname{diag}(\sigma_t^2, \sigma_t^2,
+    \sigma_h^2 (\max(d, 0.04) + (\psi / 0.01)^2)) + \sigma_\tau^2\, (\hat R\omega)(\hat R\omega)^T
 
-κ (`inflation`) for errors that are correlated over time (acceleration, inhomogeneous field); σ_t (`tilt_sigma`)
-for the accelerometer's bias; σ_h (`heading_sigma`) for the constant difference between local and reference north; σ_τ
-(`time_sigma`) for the delay of the gyroscope and of its clock, which none of the sensors can see. These constants
-bear on nothing else. For data of which the model is true, set κ = 1 and the three sigmas to 0.
+κ (`inflation`) for errors that are correlated over time; σ_t (`tilt_sigma`) for the accelerometer's bias; σ_h
+(`heading_sigma`) for iron on the body, which turns heading by ψ (rad) on average as far as the field shows it, with a
+part d of its variance still open (see `_calibrating_iron`); σ_τ (`time_sigma`) for the delay of the gyroscope and of
+its clock, which none of the sensors can see. These constants bear on nothing else. For data of which the model is
+true, set κ = 1 and the three sigmas to 0.
 
 Smoother
 --------

@@ -5,6 +5,7 @@ And find out what an estimate can tell at all: observability.
 
 from northdown.evaluation.alignment import Alignment, AlignmentKind, align
 from northdown.evaluation.chi_square import chi2_bounds, nis
+from northdown.evaluation.clock import Clock, ClockOffset, clock_offset
 from northdown.evaluation.consistency import Coverage, NormalizedError, coverage, nees
 from northdown.evaluation.consistency_conditions import Conditions
 from northdown.evaluation.consistency_runs import ConsistencyResult, monte_carlo
@@ -18,6 +19,8 @@ __all__ = [
     "Alignment",
     "AlignmentKind",
     "AttitudeError",
+    "Clock",
+    "ClockOffset",
     "Conditions",
     "ConsistencyResult",
     "Coverage",
@@ -31,6 +34,7 @@ __all__ = [
     "align",
     "attitude_error",
     "chi2_bounds",
+    "clock_offset",
     "coverage",
     "k06_configurations",
     "match",

@@ -6,7 +6,7 @@ across its own long gaps: where the truth was not seen, nothing counts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -46,6 +46,7 @@ def match(
     *,
     mask: npt.ArrayLike | None = None,
     max_gap: float | None = None,
+    late: float = 0.0,
 ) -> Matched:
     """Find the samples of an estimate at which the truth is known.
 
@@ -64,6 +65,9 @@ def match(
     max_gap : float, optional
         Longest gap (s) between samples of the truth to interpolate across. When not given, 0.1 s or three of its
         median periods, whichever is longer.
+    late : float
+        By how much the estimate's clock is later than that of the truth, s: its sample stamped t is compared with
+        the truth at t − late. Samples that do not count without it do not count with it either.
 
     Returns
     -------
@@ -79,7 +83,13 @@ def match(
     if isinstance(truth, Recording) and truth.movement is not None:
         counts &= _carry_over(estimate.time, truth.time, truth.movement)
     _check_overlap(estimate, reference)
-    known, nearest = _known(estimate.time, reference.time, _check_gap(max_gap, reference.time))
+    longest = _check_gap(max_gap, reference.time)
+    known, nearest = _known(estimate.time, reference.time, longest)
+    if late != 0.0:
+        reference = replace(reference, time=reference.time + check_number("late", late, unit="s"))
+        _check_overlap(estimate, reference)
+        known_later, nearest = _known(estimate.time, reference.time, longest)
+        known &= known_later
     index = np.flatnonzero(known & counts)
     if not index.size:
         if not known.any():

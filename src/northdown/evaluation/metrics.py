@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from northdown._validation import FloatArray, check_number
 from northdown.evaluation.alignment import Alignment, AlignmentKind, choose_kind, fit
+from northdown.evaluation.clock import Clock, ClockOffset, choose_clock
 from northdown.evaluation.matching import Truth, match
 from northdown.frames import Frame
 from northdown.orientation import Orientation
@@ -91,6 +92,8 @@ class AttitudeError:
     alignment : Alignment, optional
         Constant rotations that were found and taken out first; None when there were none. As they are fitted to this
         very estimate, the errors are then lower bounds.
+    clock : ClockOffset, optional
+        Offset between the clocks that was taken out; None when both are taken as recorded.
     """
 
     time: FloatArray
@@ -103,12 +106,14 @@ class AttitudeError:
     frame: Frame
     name: str = ""
     alignment: Alignment | None = None
+    clock: ClockOffset | None = None
 
     def __len__(self) -> int:
         return len(self.time)
 
     def __repr__(self) -> str:
-        return f"<AttitudeError {self.name or 'unnamed'}: {len(self)} samples, RMSE {self.rmse()}>"
+        clocks = "" if self.clock is None else f", clocks aligned: {self.clock}"
+        return f"<AttitudeError {self.name or 'unnamed'}: {len(self)} samples, RMSE {self.rmse()}{clocks}>"
 
     def _reduce(self, function: Callable[[FloatArray], np.floating]) -> ErrorSummary:
         return ErrorSummary(
@@ -151,6 +156,7 @@ def attitude_error(
     mask: npt.ArrayLike | None = None,
     alignment: AlignmentKind | Alignment | None = None,
     max_gap: float | None = None,
+    clock: Clock | ClockOffset = "as recorded",
 ) -> AttitudeError:
     """Error of an estimate, sample by sample.
 
@@ -168,6 +174,10 @@ def attitude_error(
         what the recording's `reference_offset` says, and ``"none"`` for an Orientation.
     max_gap : float, optional
         Longest gap (s) of the truth to interpolate across; see `match`.
+    clock : {"as recorded", "aligned"} or ClockOffset
+        ``"aligned"`` finds the offset between the recording's gyroscope and its reference (see `clock_offset`) and
+        takes it out: the estimate stamped t is compared with the truth at t − offset. It comes from the angular
+        rates only, not from the estimate, and is the same for every estimator. Or an offset found before.
 
     Returns
     -------
@@ -178,7 +188,7 @@ def attitude_error(
     ------
     InputError
         When there is no reference, no overlap in time or no sample left, or when the motion does not determine the
-        alignment.
+        alignment or the offset of the clocks.
 
     Notes
     -----
@@ -186,7 +196,9 @@ def attitude_error(
     alignment uses the estimate itself, so the errors are lower bounds.
     """
     kind = choose_kind(truth, alignment)
-    matched = match(estimate, truth, mask=mask, max_gap=max_gap)
+    offset = choose_clock(truth, clock)
+    late = 0.0 if offset is None else offset.offset
+    matched = match(estimate, truth, mask=mask, max_gap=max_gap, late=late)
     measured, true = estimate.rotation[matched.index], matched.truth.rotation
     found: Alignment | None = None
     if isinstance(kind, Alignment):
@@ -210,6 +222,7 @@ def attitude_error(
         frame=estimate.frame,
         name=estimate.name,
         alignment=found,
+        clock=offset,
     )
 
 

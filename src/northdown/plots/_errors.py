@@ -44,7 +44,8 @@ def errors(errors: AttitudeError | Sequence[AttitudeError]) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Three panels in degrees; the root mean square of the total error stands in the legend.
+        Three panels in degrees; the root mean square of the total error stands in the legend, and in the title
+        whether clocks were aligned.
 
     Raises
     ------
@@ -65,7 +66,8 @@ def errors(errors: AttitudeError | Sequence[AttitudeError]) -> Figure:
         draw_errors(axes, clock, error, color, style)
         handles.append(line_handle(f"{name}: RMSE {error.rmse().total_deg:.2f}°", color=color, linestyle=style))
     limit_errors(axes, found, np.zeros(3))
-    finish(figure, axes, clock, f"attitude error in {found[0].frame}", handles)
+    aligned = ", clocks aligned" if any(e.clock is not None for e in found) else ""
+    finish(figure, axes, clock, f"attitude error in {found[0].frame}{aligned}", handles)
     return figure
 
 
