@@ -96,7 +96,13 @@ def judge(name: str, recording: nd.Recording, tolerance: float | None) -> tuple[
         return Outcome(name, missing, before, *nothing, f"refused: {got}"), None
     part, evidence = calibration.mag, calibration.mag.evidence
     corrected = calibration.apply(recording)
-    verdict = "accepted" if evidence.held_out_after < evidence.held_out_before else "no gain"
+    verdict = "accepted"
+    if evidence.held_out_after >= evidence.held_out_before:
+        verdict += ", no gain"
+    elif spread(corrected) >= before:
+        verdict += ", no gain over all samples"
+    if any("no larger than their uncertainty" in note for note in evidence.notes):
+        verdict += ", iron within its σ"
     sigma = 100.0 * float(part.offset_sigma.max()) / part.norm
     held = (100.0 * evidence.held_out_before / part.norm, 100.0 * evidence.held_out_after / part.norm)
     return Outcome(
@@ -106,7 +112,7 @@ def judge(name: str, recording: nd.Recording, tolerance: float | None) -> tuple[
         spread(corrected),
         *held,
         sigma,
-        verdict + (", offset uncertain" if sigma > 2.0 else ""),
+        verdict,
     ), corrected
 
 
@@ -220,7 +226,7 @@ def draw(outcomes: list[Outcome], pairs: dict[str, tuple[np.ndarray, np.ndarray 
     )
     axes.set_title("Magnetometer calibration on real recordings; at the right the standard deviation", loc="left")
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(loc="lower left", fontsize=9, frameon=True)
+    axes.legend(loc="upper right", fontsize=9, frameon=True)
     figure.savefig(path, dpi=110, bbox_inches="tight")
     plt.close(figure)
 
@@ -228,9 +234,10 @@ def draw(outcomes: list[Outcome], pairs: dict[str, tuple[np.ndarray, np.ndarray 
 def reason(outcome: Outcome) -> str:
     """A refusal in a few words."""
     for sign, words in (
+        ("no ellipsoid", "no ellipsoid fits"),
         ("close", "turned too little"),
         ("a plane", "turned too little"),
-        ("uncertain", "offset too uncertain"),
+        ("uncertain", "too uncertain"),
         ("left out of the fit", "no gain on parts left out"),
         ("size fits for", "field not constant"),
     ):

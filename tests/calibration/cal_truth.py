@@ -44,6 +44,33 @@ def field_recording(
     return Recording(np.arange(len(unit)) * 0.01, mag=mag, mag_unit=mag_unit)
 
 
+def room_recording(
+    seed: int, *, lever: float, wander: float, length: float, uneven: float = 0.03, samples: int = 3000
+) -> Recording:
+    """Magnetometer that is turned all about at a `lever` arm (m), and moved by `wander` (m), in an uneven field.
+
+    The field is a random one of plane waves whose correlation falls to 1/√e over `length` (m); each of its
+    components varies by the share `uneven`. Hard iron as in `HARD_IRON`, noise 0.5 µT, 50 Hz.
+    """
+    rng = np.random.default_rng(50_000 + seed)
+    time = np.arange(samples) * 0.02
+
+    def smooth(terms: int) -> np.ndarray:
+        frequency, phase = rng.uniform(0.02, 0.2, (terms, 3)), rng.uniform(0.0, 2.0 * np.pi, (terms, 3))
+        return np.sin(2.0 * np.pi * time[:, None, None] * frequency + phase).sum(axis=1)
+
+    steps = Rotation.from_rotvec(0.02 * 0.9 * smooth(5)[1:])
+    rotation = Rotation.random(random_state=seed) * running_product(steps)
+    place = rotation.apply(lever * directions(rng, 1)[0]) + 0.5 * wander * smooth(4)
+    waves = 60
+    wave, phase = rng.normal(size=(waves, 3)) / length, rng.uniform(0.0, 2.0 * np.pi, waves)
+    dip = np.deg2rad(65.0)
+    field = FIELD * np.array([0.0, np.cos(dip), -np.sin(dip)])
+    size = FIELD * uneven * np.sqrt(2.0 / waves)
+    field = field + size * np.cos(place @ wave.T + phase) @ rng.normal(size=(waves, 3))
+    return Recording(time, mag=rotation.inv().apply(field) + HARD_IRON + 0.5 * rng.normal(size=field.shape))
+
+
 def positions_recording(
     up: np.ndarray, *, seed: int = 0, noise: float = 0.03, rest: float = 3.0, rate: float = 100.0
 ) -> Recording:

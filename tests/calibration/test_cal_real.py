@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cal_truth import SOFT_IRON
+from cal_truth import SOFT_IRON, chi2_bounds
 
 import northdown as nd
 from northdown.calibration import calibrate_gyroscope, calibrate_magnetometer, magnetometer_lag
@@ -40,8 +40,7 @@ def test_iron_added_to_a_real_recording_is_found(data_root: Path) -> None:
     hard = np.array([30.0, -12.0, 45.0])
     shifted = nd.Recording(recording.time, mag=recording.mag + hard)
     found = calibrate_magnetometer(shifted).mag
-    # µT; the prior draws an offset that is known to 0.2 of 1.7 µT by a few hundredths towards none
-    assert found.offset - plain.mag.offset == pytest.approx(hard, abs=0.1)
+    assert found.offset - plain.mag.offset == pytest.approx(hard, abs=1e-4)  # µT
     spoilt = nd.Recording(recording.time, mag=recording.mag @ SOFT_IRON.T + hard)
     both = calibrate_magnetometer(spoilt)
     assert spread(spoilt) > 0.3
@@ -50,35 +49,58 @@ def test_iron_added_to_a_real_recording_is_found(data_root: Path) -> None:
 
 def test_too_little_turning_is_refused(data_root: Path) -> None:
     walk = nd.read(data_root / "ximu" / "straightLine_CalInertialAndMag.csv", rate=256.0)
-    for recording in (walk, broad(data_root, "11"), nd.datasets.repoimu(8, 1, data_root)):
+    # RepoIMU's tests 4 and 8 see less than a tenth of all directions, about one axis
+    few = (nd.datasets.repoimu(test, 1, data_root) for test in (4, 8))
+    for recording in (walk, broad(data_root, "11"), *few):
         with pytest.raises(InputError, match="a magnetometer turned into directions all around"):
             calibrate_magnetometer(recording)
 
 
-@pytest.mark.parametrize(("test", "share"), [(2, 0.3), (3, 0.3), (4, 0.3), (5, 0.3), (6, 0.6), (7, 0.4)])
-def test_one_tenth_of_all_directions_is_enough_to_gain(data_root: Path, test: int, share: float) -> None:
+@pytest.mark.parametrize(("test", "share"), [(2, 0.3), (3, 0.3), (5, 0.3), (6, 0.6), (7, 0.4)])
+def test_a_quarter_of_all_directions_is_enough_to_gain(data_root: Path, test: int, share: float) -> None:
     """RepoIMU's sensor was hardly turned, but its field is even: parts left out of the fit become more even too."""
-    part = calibrate_magnetometer(nd.datasets.repoimu(test, 1, data_root)).mag
+    # of test 2 the points leave the offset uncertain to 6 %: it must be asked for
+    part = calibrate_magnetometer(nd.datasets.repoimu(test, 1, data_root), tolerance=0.1 if test == 2 else 0.05).mag
     assert part.evidence.coverage < 0.6
     assert part.evidence.held_out_after < share * part.evidence.held_out_before
 
 
 def test_trials_of_one_sensor_agree(data_root: Path) -> None:
-    """One sensor, four motions: its offset is the same within the σ that each trial states.
+    """One sensor, seven motions in one room: its iron is the same within the σ that each trial states.
 
-    Not so trial 03, whose uneven field passes for iron; see docs/calibration-on-real-data.md.
+    In trial 03 an uneven field passes for 1.5 µT of hard iron, with residuals as small as elsewhere.
     """
-    parts = [calibrate_magnetometer(broad(data_root, number)).mag for number in ("05", "07", "09", "31")]
+    numbers = ("03", "05", "07", "09", "21", "29", "31")
+    parts = [calibrate_magnetometer(broad(data_root, number)).mag for number in numbers]
     offsets, sigmas = np.array([p.offset for p in parts]), np.array([p.offset_sigma for p in parts])
-    mean = np.average(offsets, axis=0, weights=sigmas**-2)
-    assert ((offsets - mean) ** 2 / sigmas**2).sum() / (3 * (len(parts) - 1)) < 1.5
-    assert offsets.std(axis=0).max() < 0.5  # µT
+    off = (offsets - np.average(offsets, axis=0, weights=sigmas**-2)) / sigmas
+    low, high = chi2_bounds(off.size - 3)
+    assert low < (off**2).sum() / (off.size - 3) < high
+    assert np.abs(off).max() < 3.0  # 99.9 % of 21 normal values are within 4
+    alike = [k for k, number in enumerate(numbers) if number != "03"]
+    assert offsets[alike].std(axis=0).max() < 0.5  # µT
+    # five of the six elements of a symmetric matrix of determinant 1 are free
+    matrices, spread_of = np.array([p.matrix for p in parts]), np.array([p.matrix_sigma for p in parts])
+    off = ((matrices - np.average(matrices, axis=0, weights=spread_of**-2)) / spread_of)[:, *np.triu_indices(3)]
+    low, high = chi2_bounds(5 * (len(parts) - 1))
+    assert low < (off**2).sum() / (5 * (len(parts) - 1)) < high
 
 
-def test_a_magnet_on_the_sensor_is_refused(data_root: Path) -> None:
+@pytest.mark.parametrize("tolerance", [0.05, 0.2])
+def test_a_magnet_on_the_sensor_is_refused(data_root: Path, tolerance: float) -> None:
     for number in ("33", "35"):
-        with pytest.raises(InputError, match="leave the offset along"):
-            calibrate_magnetometer(broad(data_root, number))
+        with pytest.raises(InputError, match=r"expected a (magnetometer turned|field of constant size)"):
+            calibrate_magnetometer(broad(data_root, number), tolerance=tolerance)
+
+
+def test_what_gains_nothing_is_said_to(data_root: Path) -> None:
+    """Trial 29: a magnet that was passed makes the spread, and the sensor was calibrated before."""
+    recording = broad(data_root, "29")
+    calibration = calibrate_magnetometer(recording)
+    assert spread(calibration.apply(recording)) == pytest.approx(spread(recording), rel=0.01)
+    notes = " ".join(calibration.mag.evidence.notes)
+    assert "over all directions, disturbed ones too, the field's size is no more even" in notes
+    assert "a calibrated sensor is better left as it is" in notes
 
 
 def test_broads_magnetometer_is_late_by_13_ms(data_root: Path) -> None:

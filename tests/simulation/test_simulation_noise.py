@@ -69,10 +69,14 @@ def test_random_walk_grows_with_the_root_of_time():
 def test_three_coefficients_at_once():
     n, b, k = 1e-3, 4e-4, 4e-6
     errors = TriadErrors(noise=n, instability=b, walk=k)
-    found = [fit(samples(errors, 2.0, 200_000.0, seed), 2.0, (True, True, True)) for seed in range(1, 7)]
-    assert found[0][:2] == pytest.approx([n, b], rel=0.1)
-    # a fit's K, told by a few clusters of the longest, scatters by 10 % and more
-    assert np.mean(found, axis=0) == pytest.approx([n, b, k], rel=0.1)
+    seeds = 10
+    found = np.array([fit(samples(errors, 2.0, 200_000.0, s), 2.0, (True, True, True)) for s in range(seeds)])
+    for row in found:
+        assert row[:2] == pytest.approx([n, b], rel=0.1)
+    # K overtakes the floor beyond 13 000 s only, of which there are 15 clusters: that of one recording scatters by
+    # 16 % (44 others), so that one in two is within 10 %, and the mean of ten by 5 %
+    assert found[:, 2].std(ddof=1) / k == pytest.approx(0.16, abs=0.11)  # 3 σ of a deviation from ten
+    assert found[:, 2].mean() == pytest.approx(k, rel=0.1)
 
 
 def test_drift_is_the_true_bias_of_the_reference():

@@ -21,6 +21,7 @@ import numpy as np
 
 from northdown._validation import FloatArray
 from northdown.calibration._solve import Model, Solution
+from northdown.calibration.coverage import BINS, centres
 
 # Index pairs of the six elements of a symmetric matrix, in the order in which they are unknowns.
 PAIRS: Final = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -32,7 +33,7 @@ OFFSET: Final = (0, 1, 2)
 # 13 is free of them, so that of 120 all are spoilt once in 10⁴ times.
 _TRIALS, _SUBSET = 120, 5
 # Distances that decide between starts are those of at most this many points.
-_JUDGES = 3000
+_JUDGES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,32 +73,43 @@ def start_sphere(points: FloatArray, seed: int = 0) -> Sphere:
     scaled = (points - middle) / extent
     rng = np.random.default_rng(seed)
     judges = scaled if len(scaled) <= _JUDGES else scaled[rng.choice(len(scaled), _JUDGES, replace=False)]
-    subsets: list[FloatArray] = [scaled]
+    subsets: list[FloatArray] = [scaled[None]]
     if len(scaled) > 3 * _SUBSET:
-        subsets += [scaled[rng.choice(len(scaled), _SUBSET, replace=False)] for _ in range(_TRIALS)]
-    best, least = Sphere(np.zeros(3), 1.0), np.inf
-    for subset in subsets:
-        # |p|² = 2 c·p + (R² − |c|²)
-        design = np.column_stack([2.0 * subset, np.ones(len(subset))])
-        solution = np.linalg.lstsq(design, (subset**2).sum(axis=1), rcond=1e-9)[0]
-        square = float(solution[3] + solution[:3] @ solution[:3])
-        # a sphere smaller than half the extent would hold fewer than half of the points
-        if not square > 0.25:
-            continue
-        sphere = Sphere(solution[:3], float(np.sqrt(square)))
-        off = float(np.median(np.abs(sphere.distance(judges)))) * (1.0 + 0.1 * sphere.radius)
-        if off < least:
-            best, least = sphere, off
-    return Sphere(middle + extent * best.centre, extent * best.radius)
+        index = [rng.choice(len(scaled), _SUBSET, replace=False) for _ in range(_TRIALS)]
+        subsets.append(scaled[np.array(index)])
+    found = np.concatenate([_algebraic(subset) for subset in subsets])
+    square = found[:, 3] + (found[:, :3] ** 2).sum(axis=1)
+    # a sphere smaller than half the extent would hold fewer than half of the points
+    found, square = found[square > 0.25], square[square > 0.25]
+    if not len(found):
+        return Sphere(middle, extent)
+    radius = np.sqrt(square)
+    away = np.linalg.norm(judges[None, :, :] - found[:, None, :3], axis=2) - radius[:, None]
+    best = int(np.argmin(np.median(np.abs(away), axis=1) * (1.0 + 0.1 * radius)))
+    return Sphere(middle + extent * found[best, :3], extent * float(radius[best]))
+
+
+def _algebraic(points: FloatArray) -> FloatArray:
+    """Least squares of |p|² = 2 c·p + d for sets of points (M, N, 3): c and d = R² − |c|² of each, (M, 4)."""
+    design = np.concatenate([2.0 * points, np.ones((*points.shape[:2], 1))], axis=2)
+    solution: FloatArray = np.einsum("mij,mj->mi", np.linalg.pinv(design, rcond=1e-9), (points**2).sum(axis=2))
+    return solution
+
+
+def _length(vectors: FloatArray) -> FloatArray:
+    """Lengths (N,) of vectors (N, 3); several times as fast as NumPy's norm for so few columns."""
+    length: FloatArray = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    return length
 
 
 def curvature(points: FloatArray, centre: FloatArray, mat: FloatArray) -> FloatArray:
     """Mean curvature (N,) of the surfaces |A(m − h)| = const at points m."""
     v = (points - centre) @ mat
-    f = np.linalg.norm(v, axis=1)
+    f = _length(v)
     gradient = v @ mat
-    normal = gradient / np.linalg.norm(gradient, axis=1)[:, None]
-    size = np.linalg.norm(gradient, axis=1) / f
+    steep = _length(gradient)
+    normal = gradient / steep[:, None]
+    size = steep / f
     stretched = normal @ mat
     # ½ of the Hessian (A² − ∇f ∇fᵀ)/f traced over the tangent plane, over |∇f|
     trace = float((mat**2).sum()) - (stretched**2).sum(axis=1)
@@ -130,9 +142,9 @@ def ellipsoid_model(
         mat = symmetric(full[3:])
         q = points - full[:3]
         v = q @ mat
-        f = np.linalg.norm(v, axis=1)
+        f = _length(v)
         w = v @ mat
-        size = np.maximum(np.linalg.norm(w, axis=1), 1e-300)
+        size = np.maximum(_length(w), 1e-300)
         f = np.maximum(f, 1e-300)
         residual = (f * f - f) / size - shift
         rho = (f * f - f) / (size * size)
@@ -169,7 +181,7 @@ def sphere_prepare(points: FloatArray) -> Callable[[FloatArray, float], Model]:
 
         def model(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             away = points - x[:3]
-            size = np.maximum(np.linalg.norm(away, axis=1), 1e-300)
+            size = np.maximum(_length(away), 1e-300)
             return size - x[3] - shift, np.column_stack([-away / size[:, None], -np.ones(len(points))])
 
         return model
@@ -184,8 +196,8 @@ def normalised(x: FloatArray) -> tuple[FloatArray, float]:
     return mat * mean, mean
 
 
-def normalised_sigma(x: FloatArray, covariance: FloatArray) -> FloatArray:
-    """1-σ (3, 3) of the matrix of determinant 1.
+def normalised_covariance(x: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Covariance (9, 9) of the elements, row by row, of the matrix of determinant 1.
 
     dB = B·(dA − A tr(A⁻¹dA)/3), as d det A = det A · tr(A⁻¹ dA).
     """
@@ -197,7 +209,13 @@ def normalised_sigma(x: FloatArray, covariance: FloatArray) -> FloatArray:
         change = np.zeros((3, 3))
         change[i, j] = change[j, i] = 1.0
         derivative[:, k] = (mean * (change - mat * (np.trace(inverse @ change) / 3.0))).ravel()
-    variance = np.einsum("ik,kl,il->i", derivative, covariance[3:9, 3:9], derivative)
+    result: FloatArray = derivative @ covariance[3:9, 3:9] @ derivative.T
+    return result
+
+
+def normalised_sigma(x: FloatArray, covariance: FloatArray) -> FloatArray:
+    """1-σ (3, 3) of the matrix of determinant 1."""
+    variance = np.diag(normalised_covariance(x, covariance))
     sigma: FloatArray = np.sqrt(np.maximum(variance, 0.0)).reshape(3, 3)
     return sigma
 
@@ -210,3 +228,15 @@ def weakest(solution: Solution) -> tuple[FloatArray, float]:
     values, vectors = np.linalg.eigh(block)
     direction = vectors[:, 2]
     return direction * np.sign(direction[np.argmax(np.abs(direction))]), float(np.sqrt(max(values[2], 0.0)))
+
+
+def weakest_scale(x: FloatArray, covariance: FloatArray) -> tuple[FloatArray, float]:
+    """Direction d (3,) along which the matrix's scale dᵀBd is known worst, of a hundred, and its 1-σ."""
+    if not np.isfinite(covariance).all():
+        return np.full(3, np.nan), np.inf
+    # dᵀB d of opposite directions is the same
+    directions = np.vstack([np.eye(3), centres()[: BINS // 2]])
+    squares = np.einsum("ni,nj->nij", directions, directions).reshape(-1, 9)
+    variance = np.einsum("ni,ij,nj->n", squares, normalised_covariance(x, covariance), squares)
+    worst = int(np.argmax(variance))
+    return directions[worst], float(np.sqrt(max(variance[worst], 0.0)))

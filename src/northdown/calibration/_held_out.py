@@ -15,7 +15,8 @@ import numpy as np
 
 from northdown._validation import FloatArray
 from northdown.calibration._ellipsoid import Sphere
-from northdown.calibration._magnetometer_fit import FEWEST_ELLIPSOID, Fitted, fit_ellipsoid, fit_sphere
+from northdown.calibration._ellipsoid_fit import refit_ellipsoid
+from northdown.calibration._magnetometer_fit import FEWEST_ELLIPSOID, Fitted, fit_sphere
 from northdown.calibration._solve import robust_scale
 
 # Stretches into which a recording is cut, in turn given to the parts of which one at a time is left out.
@@ -76,4 +77,4 @@ def held_out(points: FloatArray, fitted: Fitted) -> HeldOut:
 def _fit(points: FloatArray, fitted: Fitted) -> Fitted | None:
     if fitted.model == "sphere" or len(points) < FEWEST_ELLIPSOID:
         return fit_sphere(points, Sphere(fitted.offset, fitted.radius))
-    return fit_ellipsoid(points, fitted)
+    return refit_ellipsoid(points, fitted)

@@ -1,4 +1,4 @@
-"""Sphere and ellipsoid through a magnetometer's samples, robust against disturbed ones."""
+"""Points of a magnetometer's samples, and the sphere through them, robust against disturbed ones."""
 
 from __future__ import annotations
 
@@ -14,15 +14,11 @@ from northdown.calibration._ellipsoid import (
     Sphere,
     elements,
     ellipsoid_model,
-    ellipsoid_prepare,
-    normalised,
-    normalised_sigma,
     sphere_prepare,
     start_sphere,
-    symmetric,
 )
 from northdown.calibration._known_noise import ignored
-from northdown.calibration._solve import NoFitError, Prior, Solution, robust
+from northdown.calibration._solve import NoFitError, Solution, robust
 from northdown.errors import InputError, expected
 from northdown.recording import Recording
 
@@ -32,19 +28,10 @@ _RUN: Final = math.radians(2.0)
 HOW: Final = "turn the sensor slowly about all three axes, away from iron, and calibrate again"
 FEWEST_SPHERE: Final = 20
 FEWEST_ELLIPSOID: Final = 50
-# Axes of the ellipsoid that differ by more are no soft iron, but a fit to a flat set of points.
-_MOST_FLATTENED: Final = 2.5
-# Size relative to the sphere's below which, and above whose inverse, an ellipsoid has run away on a flat set.
-_SMALLEST: Final = 0.25
 # Smallest scale of residuals relative to the radius, for data without noise.
-_FLOOR: Final = 1e-9
+FLOOR: Final = 1e-9
 # Soft iron (1-σ of each element) that a sensor may have which only hard iron is corrected for.
-_USUAL_SOFT_IRON: Final = 0.03
-# Degrees of freedom of its distribution: few, so that soft iron of ten times this is believed when the data show it.
-_SOFT_FREEDOM: Final = 3.0
-# The same of hard iron, relative to the field: of a calibrated sensor it is some %, of a raw one anything.
-_USUAL_HARD_IRON: Final = 0.03
-_HARD_FREEDOM: Final = 1.0
+USUAL_SOFT_IRON: Final = 0.03
 # Radius of a sphere, relative to the first guess, beyond which it is a plane.
 _LARGEST: Final = 20.0
 
@@ -61,6 +48,8 @@ class Fitted:
     matrix_sigma: FloatArray
     radius: float
     radius_sigma: float
+    shrink: FloatArray | None = None
+    """What the prior does to what the points alone tell, (9, 9)."""
 
 
 def gather_points(recordings: Sequence[Recording]) -> tuple[FloatArray, Sphere]:
@@ -97,7 +86,7 @@ def fit_sphere(points: FloatArray, start: Sphere) -> Fitted | None:
     unknowns = np.array([0.0, 0.0, 0.0, 1.0])
     try:
         solution = robust(
-            sphere_prepare(scaled), unknowns, floor=_FLOOR, valid=lambda x: 0.05 < float(x[3]) < _LARGEST
+            sphere_prepare(scaled), unknowns, floor=FLOOR, valid=lambda x: 0.05 < float(x[3]) < _LARGEST
         )
     except NoFitError:
         return None
@@ -126,63 +115,4 @@ def _ignored_soft_iron(points: FloatArray, weights: FloatArray) -> FloatArray:
     unit_sphere = np.concatenate([np.zeros(3), elements(np.eye(3))])
     derivatives = ellipsoid_model(points)(unit_sphere)[1]
     own = np.column_stack([derivatives[:, :3], -np.ones(len(points))])
-    return ignored(own, derivatives[:, 3:], weights, _USUAL_SOFT_IRON)
-
-
-def _is_ellipsoid(x: FloatArray) -> bool:
-    values = np.linalg.eigvalsh(symmetric(x[3:]))
-    shaped = values[0] > 0.0 and values[2] < _MOST_FLATTENED * values[0]
-    return bool(np.isfinite(x).all() and shaped and _SMALLEST < values[1] < 1.0 / _SMALLEST)
-
-
-def _priors(no_offset: FloatArray) -> tuple[Prior, Prior]:
-    """Hard and soft iron of a usual sensor are small; `no_offset` (3,) is the centre without hard iron.
-
-    The six rows for soft iron are the elements of A − ⅓ tr(A) I, those off the diagonal times √2, so that the sum of
-    squares is that of all nine elements and does not depend on how the axes lie. Five of them are free.
-
-    Hard iron may be anything, but along an axis that the data say little of it is likely to be as large as along the
-    others: of a sensor that was calibrated before, small. What is not known must not spoil that. This does not count
-    as knowledge, so that the σ say what the data tell.
-    """
-    mean = np.concatenate([no_offset, elements(np.eye(3))])
-    soft = np.zeros((6, 9))
-    soft[:, 3:] = np.diag([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
-    soft[:3, 3:6] -= 1.0 / 3.0
-    return (
-        Prior(mean, soft, _USUAL_SOFT_IRON, _SOFT_FREEDOM),
-        Prior(mean, np.eye(3, 9), _USUAL_HARD_IRON, _HARD_FREEDOM, counts=False),
-    )
-
-
-def fit_ellipsoid(points: FloatArray, near: Fitted) -> Fitted | None:
-    """Ellipsoid with the prior on soft iron; `near` is a fit whose offset and radius are about right."""
-    scaled = (points - near.offset) / near.radius
-    start = np.concatenate([np.zeros(3), elements(np.eye(3))])
-    try:
-        solution = robust(
-            ellipsoid_prepare(scaled),
-            start,
-            floor=_FLOOR,
-            valid=_is_ellipsoid,
-            priors=_priors(-near.offset / near.radius),
-        )
-    except NoFitError:
-        return None
-    mat = symmetric(solution.x[3:])
-    matrix, mean = normalised(solution.x)
-    finite = np.isfinite(solution.covariance).all()
-    inverse = np.linalg.inv(mat).astype(np.float64)
-    # d ln(mean) = −tr(A⁻¹ dA)/3
-    derivative = elements(inverse) * np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]) / 3.0
-    variance = float(derivative @ solution.covariance[3:, 3:] @ derivative) if finite else math.inf
-    return Fitted(
-        "ellipsoid",
-        solution,
-        near.offset + near.radius * solution.x[:3],
-        matrix,
-        near.radius * solution.sigma[:3],
-        normalised_sigma(solution.x, solution.covariance) if finite else np.full((3, 3), np.inf),
-        near.radius * mean,
-        near.radius * mean * math.sqrt(max(variance, 0.0)),
-    )
+    return ignored(own, derivatives[:, 3:], weights, USUAL_SOFT_IRON)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from northdown._validation import FloatArray
+from northdown.calibration._prior import Prior
 
 Model = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """From the unknowns (P,) to residuals (M,) and their derivatives (M, P)."""
@@ -26,8 +27,13 @@ _MAD = 1.482602218505602
 # taken to have this many independent values over all the data. As a function of direction, what the nine unknowns of
 # an ellipsoid can absorb are spherical harmonics of degree 0 to 2; if the degrees seen in the residuals (3 and 4, 16
 # coefficients) are half as strong as these, 8 is right.
-_INDEPENDENT = 8.0
+INDEPENDENT = 8.0
 
+# Steps of the iteration before the scale is found anew, and how often it is at most.
+_STEPS, _MOST_ROUNDS = 3, 100
+_MOST_STEPS = 60
+# Rows of a product of tall matrices at a time.
+_ROWS = 2048
 _MOST_DAMPING = 1e6
 # Residuals are in units in which the unknowns are of order one.
 _LARGEST_SCALE = 1e3
@@ -87,7 +93,7 @@ Cost = Callable[[FloatArray], tuple[float, FloatArray, FloatArray]]
 """From residuals (M,) to the cost, the weights ψ(r)/r and the slopes ψ′(r)."""
 
 
-def _tukey(scale: float) -> Cost:
+def tukey(scale: float) -> Cost:
     """Tukey's bisquare cost for residuals of that scale."""
 
     def cost(residual: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -100,37 +106,24 @@ def _tukey(scale: float) -> Cost:
     return cost
 
 
-def _curvature(jacobian: FloatArray, weight: FloatArray, slope: FloatArray) -> FloatArray:
+def gram(left: FloatArray, right: FloatArray) -> FloatArray:
+    """leftᵀ · right (P, Q) of tall matrices (M, P) and (M, Q).
+
+    In parts that a BLAS library does in one thread: for so few columns several threads take a hundred times as long.
+    """
+    total = np.zeros((left.shape[1], right.shape[1]))
+    for at in range(0, len(left), _ROWS):
+        total += left[at : at + _ROWS].T @ right[at : at + _ROWS]
+    return total
+
+
+def curvature_of_cost(jacobian: FloatArray, weight: FloatArray, slope: FloatArray) -> FloatArray:
     """Second derivative of the cost; that of the weighted squares where outliers take its definiteness."""
-    plain: FloatArray = (jacobian * weight[:, None]).T @ jacobian
+    plain = gram(jacobian * weight[:, None], jacobian)
     if slope is weight:
         return plain
-    true: FloatArray = (jacobian * slope[:, None]).T @ jacobian
+    true = gram(jacobian * slope[:, None], jacobian)
     return true if np.linalg.eigvalsh(true)[0] > 0.1 * np.linalg.eigvalsh(plain)[0] else plain
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """What is known of the unknowns beforehand: `root` · (x − `mean`) is about 0, each row with its 1-σ `scale`.
-
-    Its tails are those of Student's t with `freedom` degrees of freedom, so that the data may contradict it: what
-    they say clearly is hardly shrunk. The largest posterior is found by alternating it with the variance (Lange,
-    Little, Taylor, J. Am. Stat. Assoc. 84, 1989).
-    """
-
-    mean: FloatArray
-    root: FloatArray
-    scale: float
-    freedom: float
-    counts: bool = True
-    """Whether it makes the unknowns more certain. One that does not only shrinks them."""
-
-    def precision(self, x: FloatArray) -> FloatArray:
-        """Inverse covariance (P, P) at these unknowns."""
-        off = self.root @ (x - self.mean)
-        variance = (self.freedom * self.scale**2 + float(off @ off)) / (self.freedom + len(off))
-        result: FloatArray = self.root.T @ self.root / variance
-        return result
 
 
 def descend(
@@ -139,10 +132,12 @@ def descend(
     cost: Cost,
     valid: Callable[[FloatArray], bool] | None = None,
     pull: tuple[FloatArray, FloatArray] | None = None,
+    most: int = _MOST_STEPS,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Levenberg–Marquardt to convergence; returns the unknowns, residuals and derivatives there.
+    """Levenberg–Marquardt to convergence, or for `most` good steps.
 
-    The cost grows by ½ (x − m)ᵀ M (x − m) where `pull` is (m, M).
+    Returns the unknowns, and the residuals and derivatives there. The cost grows by ½ (x − m)ᵀ M (x − m) where `pull`
+    is (m, M).
     """
     mean, matrix = pull if pull is not None else (x, np.zeros((len(x), len(x))))
 
@@ -152,13 +147,13 @@ def descend(
 
     def derivatives(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         gradient = jacobian.T @ (weight * residual) + matrix @ (x - mean)
-        return _curvature(jacobian, weight, slope) + matrix, gradient
+        return curvature_of_cost(jacobian, weight, slope) + matrix, gradient
 
     residual, jacobian = model(x)
     value, weight, slope = total(x, residual)
     hessian, gradient = derivatives(x)
-    damping = 1e-4
-    for _ in range(60):
+    damping, good = 1e-4, 0
+    for _ in range(_MOST_STEPS):
         diagonal = np.diag(hessian) + 1e-12 * max(float(np.trace(hessian)), 1e-300)
         step = -np.linalg.solve(hessian + damping * np.diag(diagonal), gradient)
         if valid is not None and not valid(x + step):
@@ -171,11 +166,11 @@ def descend(
         if np.isfinite(new_value) and new_value <= value:
             x, value, residual, jacobian = x + step, new_value, new_residual, new_jacobian
             hessian, gradient = derivatives(x)
-            damping = max(damping * 0.1, 1e-12)
+            damping, good = max(damping * 0.1, 1e-12), good + 1
         else:
             damping *= 10.0
         # near the minimum, rounding decides whether the cost falls
-        if damping > _MOST_DAMPING or bool((np.abs(step) <= 1e-9 * (1e-2 + np.abs(x))).all()):
+        if good == most or damping > _MOST_DAMPING or bool((np.abs(step) <= 1e-9 * (1e-2 + np.abs(x))).all()):
             break
     return x, residual, jacobian
 
@@ -189,7 +184,8 @@ def robust(
     shared: int = 0,
     all_persistent: bool = False,
     valid: Callable[[FloatArray], bool] | None = None,
-    priors: Sequence[Prior] = (),
+    prior: Prior | None = None,
+    accuracy: float = 1e-7,
 ) -> Solution:
     """Fit with Tukey's weights; the scale of the noise is found from the residuals.
 
@@ -209,60 +205,51 @@ def robust(
         Take the residuals for persistent errors altogether, where neighbours do not tell.
     valid : callable
         Whether unknowns are sensible; steps that lead to others are shortened.
-    priors : sequence of Prior
-        What is known beforehand, with one `mean`. It weighs as its σ says beside data whose errors persist.
+    prior : Prior, optional
+        What is known beforehand. It weighs as its σ says beside points whose errors are independent.
+    accuracy : float
+        Relative change of the scale, and a hundredth of it of the unknowns, at which the iteration ends.
 
     Returns
     -------
     Solution
-        The covariance is the sandwich of an M estimator, from the residuals as they are, without supposing that they
-        are of equal size; to it is added that of persistent errors.
+        The covariance leaves the prior out. It is the sandwich of an M estimator, from the residuals as they are,
+        without supposing that they are of equal size; to it is added that of persistent errors.
 
     Raises
     ------
     NoFitError
         When the iteration ends where even the shortest step leaves what is valid.
     """
-    n, p = len(prepare(x, floor)(x)[0]), len(x)
-    apart = components * (1 + shared)
+    p = len(x)
     scale = max(robust_scale(prepare(x, floor)(x)[0], p), floor)
-    pull, noise = np.zeros((p, p)), 0.0
-    for _ in range(30):
+    for _ in range(_MOST_ROUNDS):
         if not scale < _LARGEST_SCALE:
             raise NoFitError
-        given = (priors[0].mean, pull) if priors else None
-        x, residual, jacobian = descend(prepare(x, scale), x, _tukey(scale), valid, given)
+        pull = None if prior is None else (prior.mean, scale**2 * prior.precision(x))
+        before = x
+        x, residual, jacobian = descend(prepare(x, scale), x, tukey(scale), valid, pull, _STEPS)
         new = max(robust_scale(residual, p), floor)
-        settled = abs(new - scale) <= 1e-7 * scale
+        change = max(abs(new / scale - 1.0), 1e2 * float(np.abs(x - before).max()))
         scale = new
-        _, weight, slope = _tukey(scale)(residual)
-        persistent = scale if all_persistent else _persistent(residual, weight, scale, apart)
-        # variance of one residual as if they were independent
-        noise = scale**2 + n * persistent**2 / _INDEPENDENT
-        if priors:
-            new_pull = noise * np.sum([prior.precision(x) for prior in priors], axis=0)
-            settled = settled and bool(np.abs(new_pull - pull).max() <= 1e-5 * np.abs(new_pull).max())
-            pull = new_pull
-        if settled:
+        if change <= accuracy:
             break
-    plain = (jacobian * weight[:, None]).T @ jacobian
-    counted = np.zeros((p, p))
-    for prior in priors:
-        counted += noise * prior.precision(x) if prior.counts else 0.0
-    bread = inverse(_curvature(jacobian, weight, slope) + counted)
+    _, weight, slope = tukey(scale)(residual)
+    persistent = scale if all_persistent else persistence(residual, weight, scale, [components * (1 + shared)])
+    plain = gram(jacobian * weight[:, None], jacobian)
+    bread = inverse(curvature_of_cost(jacobian, weight, slope))
     covariance = bread
     if np.isfinite(bread).all():
         score = (jacobian * (weight * residual)[:, None]).reshape(-1, components, p).sum(axis=1)
-        covariance = bread @ (_meat(score, shared) + noise * counted) @ bread
-        from_errors = bread @ plain @ bread if priors else inverse(plain)
-        covariance = covariance + (n * persistent**2 / _INDEPENDENT) * from_errors
+        covariance = bread @ _meat(score, shared) @ bread
+        covariance = covariance + (len(residual) * persistent**2 / INDEPENDENT) * inverse(plain)
     return Solution(x, covariance, scale, weight, persistent, condition(plain))
 
 
 def _meat(score: FloatArray, shared: int) -> FloatArray:
     """Covariance (P, P) of the sum of scores (M, P), of which neighbours up to `shared` apart are correlated."""
     n, p = score.shape
-    alone: FloatArray = score.T @ score * (n / max(n - p, 1))
+    alone: FloatArray = gram(score, score) * (n / max(n - p, 1))
     if not shared:
         return alone
     total = alone.copy()
@@ -278,19 +265,20 @@ def _meat(score: FloatArray, shared: int) -> FloatArray:
     return meat
 
 
-def _persistent(residual: FloatArray, weight: FloatArray, scale: float, apart: int) -> float:
-    """σ of the part that an observation's residuals have in common with the next one's.
+def persistence(residual: FloatArray, weight: FloatArray, scale: float, lags: Sequence[int]) -> float:
+    """σ of the part that an observation's residuals have in common with those of the next ones.
 
-    The covariance of residuals so many apart, less what it may be by chance (2 σ of white noise).
+    The mean product of residuals so many apart; 0 where it may be by chance (2 σ of white noise).
     """
-    if len(residual) <= apart:
-        return 0.0
-    pair = weight[:-apart] * weight[apart:]
-    total = float(pair.sum())
+    product, total = 0.0, 0.0
+    for apart in lags:
+        pair = weight[:-apart] * weight[apart:]
+        product += float((pair * residual[:-apart] * residual[apart:]).sum())
+        total += float(pair.sum())
     if total <= 0.0:
         return 0.0
-    common = float((pair * residual[:-apart] * residual[apart:]).sum()) / total
-    return math.sqrt(max(0.0, common - 2.0 * scale**2 / math.sqrt(total)))
+    common = product / total
+    return math.sqrt(common) if common > 2.0 * scale**2 / math.sqrt(total) else 0.0
 
 
 def inverse(mat: FloatArray) -> FloatArray:
