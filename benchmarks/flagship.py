@@ -55,6 +55,7 @@ START = {
     "rest_offset": 1e-4,
     "gyr_matrix": 1e-3,
     "mag_delay_sigma": 0.01,
+    "smooth_walk": 1.0,
 }
 FEW = ("gyr_bias_walk", "mag_noise", "gate_power", "gyr_matrix", "mag_delay_sigma")
 """The only ones that `cross-few` changes."""
@@ -74,6 +75,9 @@ ABLATIONS = {
     "no rest offset": {"rest_offset": 0.0},
     "no growth with motion": {"acc_motion": 0.0, "speed_motion": 0.0},
     "no growth with rate": {"gyr_scale": 0.0},
+    "no second pass": {"heading_outlier": 0.0, "smooth_walk": 1.0},
+    "second pass, headings alike": {"heading_outlier": 0.0},
+    "second pass, same bias walk": {"smooth_walk": 1.0},
 }
 
 Method = Callable[[nd.Recording], nd.Orientation]

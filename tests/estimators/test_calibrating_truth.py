@@ -47,7 +47,7 @@ class Dense:
         self.motion = self.clock = self.age_acc = self.age_mag = self.learnt = self.mean_u = 0.0
         self.reference = np.zeros(2)
         self.turned, self.history = np.zeros(3), [(0.0, np.zeros(3))]
-        self.still, self.blocks, self.epochs, self.seen = False, [], [], []
+        self.still, self.blocks, self.epochs, self.taken, self.seen = False, [], [], [], []
         self.begin()
 
     def begin(self):
@@ -146,13 +146,16 @@ class Dense:
         self.M = self.M + d[MATRIX].reshape(3, 3).T
         self.delay += d[DELAY]
         self.epochs.append((k, self.F, prior, self.P, d, before, self.R, self.b))
+        heading = 3 * (self.T_acc > 0.0) if self.fields else None
+        seen = (np.mean(self.fields, axis=0), self.age) if self.fields else None
+        self.taken.append((self.F, Q, H, np.array(y), np.array(r), d, heading, seen))
         self.begin()
 
     def heading(self):
         f = self.f
         x, y, z = h = np.mean(self.fields, axis=0)
         sample, age = np.array([math.hypot(x, y), z]), min(self.age_mag, 1.0)
-        self.age_mag = 0.0
+        self.age, self.age_mag = age, 0.0
         self.learnt += age
         u, gain = 0.0, min(1.0, age / self.learnt)
         if self.learnt > 1.0 + 0.5 * age:
@@ -296,7 +299,8 @@ def smooth_dense(epochs):
 
 
 def test_smoother_agrees_with_a_dense_one(recording):
-    f = nd.CalibratingEKF(rest_gyr=0.0, inflation=1.0, tilt_sigma=0.0, heading_sigma=0.0, time_sigma=0.0)
+    plain = {"inflation": 1.0, "tilt_sigma": 0.0, "heading_sigma": 0.0, "time_sigma": 0.0}
+    f = nd.CalibratingEKF(rest_gyr=0.0, heading_outlier=0.0, smooth_walk=1.0, **plain)  # the first pass only
     smoothed, first = f.smooth(recording), f.run(recording).rotation[0]
     dense = Dense(f, first.as_matrix(), still=np.zeros(len(recording)))
     # the start is found in the first sample, which is not taken a second time

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from northdown.kernels.rows import WIDTH, add_row, mirror_row, take_measurement
+from northdown.kernels.rows import WIDTH, add_row, add_three_rows, mirror_row, take_measurement, weigh_rows
 from northdown.kernels.stillness import is_quiet, noise_density, quiet_windows
 
 N = 22
@@ -42,6 +42,16 @@ def test_mirror():
     s[3 * WIDTH : 3 * WIDTH + N] = np.arange(N)
     mirror_row(s, COV, N, 3)
     assert np.array_equal(s[: N * WIDTH].reshape(N, WIDTH)[:, 3], np.arange(N))
+
+
+def test_sums_of_rows():
+    s, P, rng = state(6)
+    weights = rng.normal(size=N + 4)
+    weigh_rows(s, GAIN, weights, 4, N, COV)
+    assert np.abs(s[GAIN : GAIN + N] - weights[4:] @ P).max() < 1e-12  # rounding of entries of size 100
+    row = s[GAIN : GAIN + N].copy()
+    add_three_rows(s, GAIN, (0.3, -2.0, 1.5), COV + 4 * WIDTH)
+    assert np.abs(s[GAIN : GAIN + N] - row - np.array([0.3, -2.0, 1.5]) @ P[4:7]).max() < 1e-12
 
 
 def test_quiet_windows_are_those_of_a_direct_search():

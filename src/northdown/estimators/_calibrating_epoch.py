@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from northdown.estimators._calibrating_field import judge_field
 from northdown.estimators._calibrating_iron import forget_iron, look_for_iron
 from northdown.estimators._calibrating_layout import (
     ACC_SQUARE,
@@ -29,7 +30,6 @@ from northdown.estimators._calibrating_layout import (
     FIELD_SLOPE,
     FIELD_SUM,
     FORCE,
-    GAINS,
     GIVEN,
     GYR_BIAS,
     GYR_MATRIX,
@@ -40,7 +40,6 @@ from northdown.estimators._calibrating_layout import (
     MOTION,
     N_BLOCK,
     N_BLOCKS,
-    NEW_FIELD,
     OFFSET,
     RATE_SQUARE,
     REST_OFFSET,
@@ -51,20 +50,20 @@ from northdown.estimators._calibrating_layout import (
     STILL,
     SUMS,
     SUMS_END,
-    TAKEN,
     TIME,
     TIME_ACC,
     TURN,
     VELOCITY,
+    WIDENED,
     WORK,
     N,
 )
+from northdown.estimators._calibrating_take import forget_taken, take_heading, take_rest, take_velocity
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import multiply, normalize
-from northdown.kernels.rows import WIDTH, add_row, copy_row, mirror_row, take_measurement
+from northdown.kernels.rows import WIDTH, add_row, copy_row, mirror_row
 from northdown.kernels.so3 import exp
 from northdown.kernels.stillness import CONTRADICTED, is_near, is_quiet, kind_of_rest, noise_density
-from northdown.kernels.weighting import REJECTED, departure
 
 LONGEST_FIELD: Final = 1.0
 """The same for the magnetometer: a field seen rarely is worth no more than one seen once a second."""
@@ -73,8 +72,6 @@ CLIPPED_RATE: Final = 0.3
 """Standard deviation of what a clipped rate lacks, as a part of the range."""
 REST_GATE: Final = 4.0
 """Sigmas by which an epoch's mean rate may miss that of rest."""
-FIELD_LEARNT: Final = 1.0
-"""Time (s) during which the field's reference is averaged without judging."""
 PARALLEL: Final = 1e-6
 
 
@@ -90,34 +87,28 @@ def clear_sums(s: Any) -> None:
 def close_epoch(p: Any, s: Any) -> None:
     """End of an epoch: propagate the covariance, take the measurements, correct the nominal values."""
     time = s[TIME]
-    _propagate(p, s, time)
+    propagate(p, s, time)
     for a in range(3):
         s[SPEED + a] += s[SHIFT + a]
     if s[GIVEN] < 0.0:
         s[STILL] = _rest_in_window(p, s)
     rest = max(p.rest_bias, s[DENSITY]) / time
+    s[WIDENED] = 0.0
     still = s[STILL] > 0.0 and (_rate_is_of_rest(s, rest) or _bias_is_contradicted(p, s))
     s[STILL] = 1.0 if still else 0.0
     for j in range(WIDTH):
         s[ERROR + j] = 0.0
-    for k in range(14):
-        s[TAKEN + k] = 0.0
+    forget_taken(s)
     if s[TIME_ACC] > 0.0:
         r = p.rest_speed if still else p.speed * (1.0 + p.speed_motion * s[MOTION])
         r /= s[TIME_ACC]
         for a in range(3):
-            copy_row(s, GAINS + a * WIDTH, COV + (VELOCITY + a) * WIDTH)
-            variance = s[GAINS + a * WIDTH + VELOCITY + a] + r
-            _take(s, a, variance, -s[SPEED + a] - s[ERROR + VELOCITY + a])
+            take_velocity(s, a, r, -s[SPEED + a])
     if s[COUNT_MAG] > 0.0:
-        _take_heading(p, s)
+        _weigh_heading(p, s)
     if still:
         for a in range(3):
-            gain = GAINS + (4 + a) * WIDTH
-            copy_row(s, gain, COV + (BIAS + a) * WIDTH)
-            add_row(s, gain, 1.0, COV + (OFFSET + a) * WIDTH)
-            variance = s[gain + BIAS + a] + s[gain + OFFSET + a] + rest
-            _take(s, 4 + a, variance, _rest_innovation(s, a) - s[ERROR + BIAS + a] - s[ERROR + OFFSET + a])
+            take_rest(s, a, rest, _rest_innovation(s, a))
     _correct(s)
     s[CLOSED] = 1.0
 
@@ -151,18 +142,12 @@ def _bias_is_contradicted(p: Any, s: Any) -> bool:
         return False
     for a in range(3):
         s[COV + (BIAS + a) * (WIDTH + 1)] += _rest_innovation(s, a) ** 2
+    s[WIDENED] = 1.0
     return True
 
 
 @inline
-def _take(s: Any, k: int, variance: float, innovation: float) -> None:
-    s[TAKEN + 2 * k] = 1.0 / variance
-    s[TAKEN + 2 * k + 1] = innovation / variance
-    take_measurement(s, COV, N, GAINS + k * WIDTH, ERROR, variance, innovation)
-
-
-@inline
-def _propagate(p: Any, s: Any, time: float) -> None:
+def propagate(p: Any, s: Any, time: float) -> None:
     """P ← F P Fᵀ + Q over an epoch; only the rows of attitude and velocity of F differ from the identity."""
     fx, fy, fz = s[FORCE], s[FORCE + 1], s[FORCE + 2]
     theta, speed = WORK, WORK + 3 * WIDTH
@@ -248,8 +233,8 @@ def _rest_in_window(p: Any, s: Any) -> float:
 
 
 @inline
-def _take_heading(p: Any, s: Any) -> None:
-    """The heading of the epoch's mean field, weighed by how far the field is from its reference."""
+def _weigh_heading(p: Any, s: Any) -> None:
+    """Take the heading of the epoch's mean field, weighed by how far the field is from its reference."""
     k = 1.0 / s[COUNT_MAG]
     x, y, z = s[FIELD_SUM] * k, s[FIELD_SUM + 1] * k, s[FIELD_SUM + 2] * k
     square = x * x + y * y
@@ -257,63 +242,21 @@ def _take_heading(p: Any, s: Any) -> None:
     s[AGE_MAG] = 0.0
     if not age > 0.0:
         return
-    h = math.sqrt(square)
-    s[FIELD + 2] += age
-    learnt = s[FIELD + 2]
-    u, gain = 0.0, min(1.0, age / learnt)
-    if learnt > FIELD_LEARNT + 0.5 * age:  # between two epochs, so that rounding does not decide
-        u = min(60.0, departure(p.norm_gate, p.dip_gate, s[FIELD], s[FIELD + 1], h, z))
-        gain = min(1.0, age / min(learnt, p.field_window)) / (1.0 + u)
-        if u > REJECTED and _is_new_field(p, s, h, z, age):
-            s[FIELD], s[FIELD + 1], s[FIELD + 2] = s[NEW_FIELD], s[NEW_FIELD + 1], s[NEW_FIELD + 2]
-            u = s[MEAN_DEPARTURE] = 0.0
-        elif u <= REJECTED:
-            s[NEW_FIELD + 2] = 0.0
-    s[FIELD] += gain * (h - s[FIELD])
-    s[FIELD + 1] += gain * (z - s[FIELD + 1])
+    learnt = s[FIELD + 2] + age
+    u = judge_field(p, s, math.sqrt(square), z, age)
     if s[FIELD + 2] != learnt:  # another field has become the reference
         forget_iron(s)
     # A disturbed field has the norm and the dip of the reference now and then, by chance.
-    if p.gate_window > 0.0:
-        s[MEAN_DEPARTURE] += min(1.0, age / p.gate_window) * (u - s[MEAN_DEPARTURE])
-        u = max(u, s[MEAN_DEPARTURE])
+    u = max(u, s[MEAN_DEPARTURE])
     s[DEPARTURE] = u
     if not square > PARALLEL * (square + z * z):
         return
     hx, hy = x * z / square, y * z / square
     lag = (y * s[FIELD_SLOPE] - x * s[FIELD_SLOPE + 1]) * k / square
     s[HEADING_SLOPE], s[HEADING_SLOPE + 1], s[HEADING_SLOPE + 2] = hx, hy, lag
-    gain_row = GAINS + 3 * WIDTH
-    for j in range(WIDTH):
-        s[gain_row + j] = -s[COV + 2 * WIDTH + j]
-    add_row(s, gain_row, hx, COV)
-    add_row(s, gain_row, hy, COV + WIDTH)
-    add_row(s, gain_row, lag, COV + DELAY * WIDTH)
     doubt = (1.0 + u) ** p.gate_power
-    r = p.mag / age * doubt
     look_for_iron(s, (x, y, z), age / doubt)
-    variance = hx * s[gain_row] + hy * s[gain_row + 1] - s[gain_row + 2] + lag * s[gain_row + DELAY] + r
-    known = hx * s[ERROR] + hy * s[ERROR + 1] - s[ERROR + 2] + lag * s[ERROR + DELAY]
-    _take(s, 3, variance, math.atan2(y, x) - known)
-
-
-@inline
-def _is_new_field(p: Any, s: Any, h: float, z: float, age: float) -> bool:
-    """Whether a field unlike the reference has been steady for so long, in motion, that it must be that of the place.
-
-    Motion is asked for because a magnet beside a body at rest is steady too.
-    """
-    if s[STILL] > 0.0:
-        return False
-    steady = s[NEW_FIELD + 2]
-    if steady > 0.0 and departure(p.norm_gate, p.dip_gate, s[NEW_FIELD], s[NEW_FIELD + 1], h, z) < REJECTED:
-        s[NEW_FIELD + 2] = steady + age
-        gain = age / (steady + age)
-        s[NEW_FIELD] += gain * (h - s[NEW_FIELD])
-        s[NEW_FIELD + 1] += gain * (z - s[NEW_FIELD + 1])
-    else:
-        s[NEW_FIELD], s[NEW_FIELD + 1], s[NEW_FIELD + 2] = h, z, age
-    return bool(s[NEW_FIELD + 2] > p.field_new)
+    take_heading(s, p.mag / age * doubt, math.atan2(y, x))
 
 
 @inline

@@ -12,17 +12,23 @@ import numpy.typing as npt
 
 from northdown.estimators._calibrating_layout import (
     CLOSED,
+    COUNT_MAG,
     COV,
     DENSITY,
+    DEPARTURE,
     ERROR,
+    FIELD_SUM,
     GAINS,
     GIVEN,
     GYR_BIAS,
+    MAG_DELAY,
     N_MOVE,
+    N_TAKEN,
     RATE,
     REST_OFFSET,
+    STILL,
     TAKEN,
-    TURN,
+    TIME,
     N,
 )
 from northdown.kernels.jit import compiled, inline
@@ -47,6 +53,8 @@ Array = npt.NDArray[np.float64]
 
 RATE_N: Final = 7
 """Where the rate in navigation axes stands in the output on the way forth; on the way back the covariance does."""
+DIAGNOSTICS: Final = 19
+"""Where departure of the field, delay and stillness stand in the output."""
 
 # What is kept of an epoch.
 END: Final = 0  # index of its last sample
@@ -54,11 +62,19 @@ FRESH: Final = 1  # whether the attitude was found anew in it, so that nothing b
 BEFORE: Final = 2  # attitude before the measurements
 AFTER: Final = 6
 NOMINAL_BIAS: Final = 10
-MOVE: Final = 13  # Σ R dt, Σ R r dt, Σ R dt at rest, Σ R a dt
-MEASURED: Final = MOVE + N_MOVE  # 1/S and y/S of seven measurements, then the heading's slopes
-KEPT_GAINS: Final = MEASURED + 17
+MOVE: Final = 13  # sums from time and squares to Σ R dt, Σ R r dt, Σ R dt at rest, Σ R a dt
+MEASURED: Final = MOVE + N_MOVE  # from 1/S and y/S of seven measurements to their noise
+CORRECTION: Final = MEASURED + N_TAKEN  # of the nominal values, by the measurements
+MEAN: Final = CORRECTION + N  # error that is left after it, of attitude and bias: that of a second pass
+SEEN: Final = MEAN + 6  # sum of the field (NED), its samples, departure by which it was weighed, stillness
+KEPT_GAINS: Final = SEEN + 6
 KEPT_COV: Final = KEPT_GAINS + 7 * N  # rows of attitude and bias
 N_RECORD: Final = KEPT_COV + 6 * N
+
+# What is kept of the beginning.
+LATE: Final = 4  # whether the attitude was set from the sensors later than at the first sample
+BEGIN: Final = 5  # covariance
+N_START: Final = BEGIN + N * WIDTH
 
 
 _VECTOR: Any = numba.float64[::1]
@@ -70,8 +86,7 @@ _ROWS: Any = numba.types.Array(numba.float64, 2, "C", readonly=True)
 
 def _make_forth(kernel: Kernel) -> Callable[..., Any]:
     tick = make_tick(kernel)
-    output = kernel.output
-    n_params, n_out = kernel.n_params, kernel.n_out
+    n_params = kernel.n_params
 
     def forth(
         params: Array,
@@ -85,18 +100,20 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
         out: Array,
         flags: npt.NDArray[np.uint8],
         records: Array,
-        jump: Array,
+        start: Array,
     ) -> tuple[int, int, int]:
         """Filter; returns code, samples done and epochs kept.
 
-        `rate` is that of `quiet_windows`. To `jump`, a quaternion, are added the rotations by which the attitude was
-        set from the sensors later than at the first sample.
+        `rate` is that of `quiet_windows`. `start` (N_START) gets the rotation, as a quaternion, by which the attitude
+        was set from the sensors later than at the first sample, whether it was, and the covariance after that sample.
         """
         p = to_fixed_tuple(params, n_params)
         s = state[N_RUNNER:]
         r = (state[PENDING], state[1], state[2], state[3], state[4], state[MAX_GAP])
         epochs = 0
         fresh = True
+        for j in range(BEGIN):
+            start[j] = 1.0 if j == 0 else 0.0
         for i in range(len(time)):
             dt = time[i] - time[i - 1] if i > 0 else 0.0
             if dt < 0.0:
@@ -123,11 +140,16 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
                 return code, i, epochs
             if not is_attitude(s[0], s[1], s[2], s[3]):
                 return NOT_FINITE, i, epochs
-            o = output(p, s)
+            if i == 0:
+                for j in range(N * WIDTH):
+                    start[BEGIN + j] = s[COV + j]
             for j in range(4):
                 out[i, j] = s[j]
-            for j in range(4, n_out):
-                out[i, j] = o[j]
+            out[i, DIAGNOSTICS], out[i, DIAGNOSTICS + 1], out[i, DIAGNOSTICS + 2] = (
+                s[DEPARTURE],
+                s[MAG_DELAY],
+                s[STILL],
+            )
             rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
             for j in range(3):
                 out[i, RATE_N + j] = rate_n[j]
@@ -136,9 +158,10 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
                 if i > 0:
                     v = ((r[1] - bias[0]) * dt, (r[2] - bias[1]) * dt, (r[3] - bias[2]) * dt)
                     turned = multiply((s[0], s[1], s[2], s[3]), conjugate(multiply(q, exp(v))))
-                    turned = multiply(turned, (jump[0], jump[1], jump[2], jump[3]))
+                    turned = multiply(turned, (start[0], start[1], start[2], start[3]))
                     for j in range(4):
-                        jump[j] = turned[j]
+                        start[j] = turned[j]
+                    start[LATE] = 1.0
             if s[CLOSED] > 0.0 and r[0] == pending:
                 _keep(s, i, fresh, records[epochs])
                 epochs += 1
@@ -161,8 +184,21 @@ def _keep(s: Array, i: int, fresh: bool, row: Array) -> None:
     for a in range(3):
         row[NOMINAL_BIAS + a] = s[GYR_BIAS + a]
     for j in range(N_MOVE):
-        row[MOVE + j] = s[TURN + j]
-    for j in range(17):
+        row[MOVE + j] = s[TIME + j]
+    for j in range(N):
+        row[CORRECTION + j] = s[ERROR + j]
+    for j in range(6):
+        row[MEAN + j] = 0.0
+    for a in range(3):
+        row[SEEN + a] = s[FIELD_SUM + a]
+    row[SEEN + 3], row[SEEN + 4], row[SEEN + 5] = s[COUNT_MAG], s[DEPARTURE], s[STILL]
+    keep_taken(s, row)
+
+
+@inline
+def keep_taken(s: Array, row: Array) -> None:
+    """The measurements of an epoch, their gains, and the covariance after them."""
+    for j in range(N_TAKEN):
         row[MEASURED + j] = s[TAKEN + j]
     for k in range(7):
         for j in range(N):
@@ -174,7 +210,7 @@ def _keep(s: Array, i: int, fresh: bool, row: Array) -> None:
 
 @cache
 def forth(kernel: Kernel) -> Callable[..., tuple[int, int, int]]:
-    """Compiled ``forth(params, state, limit, time, gyr, acc, mag, rate, out, flags, records, jump)``."""
+    """Compiled ``forth(params, state, limit, time, gyr, acc, mag, rate, out, flags, records, start)``."""
     signature = (
         *(_VECTOR, _VECTOR, numba.float64),
         *(_TIMES, _ROWS, _ROWS, _ROWS),

@@ -95,6 +95,12 @@ class CalibrationParameters(Estimator):
         The same about the vertical. Raising it turns faster to the magnetometer's north at first.
     start_bias : float
         Standard deviation of the bias at the start, rad/s. Raising it learns the bias faster at first.
+    heading_outlier : float
+        Number of robust standard deviations from the smoothed heading above which a heading counts less in `smooth`,
+        by the square of it; 0 leaves all weights as they are in real time. Raising it believes a wrong field more.
+    smooth_walk : float
+        Part of `gyr_bias_walk` that counts in `smooth`. In real time the bias also makes up for calibration not yet
+        known. Raising it lets the smoothed bias change faster.
     inflation : float
         Factor κ on the reported standard deviations. Raising it widens them.
     tilt_sigma : float
@@ -139,6 +145,8 @@ class CalibrationParameters(Estimator):
     start_tilt: float = parameter(0.05, unit="rad", above=0.0)
     start_heading: float = parameter(0.2, unit="rad", above=0.0)
     start_bias: float = parameter(0.02, unit="rad/s", above=0.0)
+    heading_outlier: float = parameter(3.0, low=0.0)
+    smooth_walk: float = parameter(0.5, low=0.0)
     inflation: float = parameter(1.0, above=0.0)
     tilt_sigma: float = parameter(0.003, unit="rad", low=0.0)
     heading_sigma: float = parameter(0.015, unit="rad", low=0.0)

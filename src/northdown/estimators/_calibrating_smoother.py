@@ -11,14 +11,27 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from northdown.estimators._calibrating_back import back
-from northdown.estimators._calibrating_forth import AFTER, BEFORE, END, N_RECORD, NOMINAL_BIAS, RATE_N, forth
+from northdown.estimators._calibrating_again import again
+from northdown.estimators._calibrating_back import back, residuals
+from northdown.estimators._calibrating_forth import (
+    AFTER,
+    BEFORE,
+    BEGIN,
+    END,
+    LATE,
+    N_RECORD,
+    N_START,
+    NOMINAL_BIAS,
+    RATE_N,
+    forth,
+)
 from northdown.estimators._calibrating_iron import heading_doubt
 from northdown.estimators._calibrating_layout import (
     COV,
     Terms,
 )
 from northdown.estimators._calibrating_result import ahead, covariance_of
+from northdown.estimators._calibrating_weights import reweigh
 from northdown.estimators._stream import Stream, all_samples
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.quaternion import congruent, conjugate, multiply, normalize, whole_axes
@@ -40,12 +53,19 @@ _TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)  # a recor
 
 
 def smooth(
-    stream: Stream, recording: Recording, window: float, rest_gyr: float, rest_acc: float, rest_rate: float
+    stream: Stream,
+    recording: Recording,
+    window: float,
+    rest_gyr: float,
+    rest_acc: float,
+    rest_rate: float,
+    most: float,
+    walk: float,
 ) -> tuple[npt.NDArray[np.uint8], Array]:
     """Flags and output, as the kernel records it, of a recording smoothed by the estimator of a new stream.
 
     `window`, `rest_gyr`, `rest_acc` and `rest_rate` are the estimator's criteria of rest; the window lies around the
-    sample here.
+    sample here. `most` and `walk` are those of the second pass, see `_calibrating_again`.
     """
     estimator, work = stream.estimator, stream._work
     kernel, time = estimator.kernel, recording.time
@@ -56,30 +76,43 @@ def smooth(
     # An epoch is at least two thirds of its nominal length. Rows that are not needed cost no memory.
     span = (time.max() - time[0]) / work.params[Terms._fields.index("epoch")] if n else 0.0
     records = np.empty((min(n, int(1.5 * span) + 2), N_RECORD))
-    start = work.state.copy()
-    jump = np.array([1.0, 0.0, 0.0, 0.0])
+    state, start = work.state.copy(), np.empty(N_START)
     for _ in range(2):
         code, done, kept = forth(kernel)(
-            work.params, work.state, rest_rate, time, *sensors, rate, out, flags, records, jump
+            work.params, work.state, rest_rate, time, *sensors, rate, out, flags, records, start
         )
         if code:
             stream._raise(code, time[done], done)
-        if jump[0] == 1.0:
+        if not start[LATE]:
             break
         # The attitude was found late: once more, with what is now known of the beginning.
-        work.state[:] = start
+        work.state[:] = state
         work.state[PENDING] = flags[-1] & (TILT_UNKNOWN | HEADING_UNKNOWN)
-        work.state[N_RUNNER : N_RUNNER + 4] = multiply(tuple(jump), tuple(out[0, :4]))
+        work.state[N_RUNNER : N_RUNNER + 4] = multiply(tuple(start[:4]), tuple(out[0, :4]))
         tilt = work.state[N_RUNNER + COV :]
         tilt[0] = tilt[WIDTH + 1] = _FOUND_LATE**2
         tilt[2 * WIDTH + 2] = math.pi**2 / 3.0
         flags[:] = 0
-        jump[:] = 1.0, 0.0, 0.0, 0.0
-    smoothed = np.empty((kept, 18))
-    back()(records[:kept], smoothed)
+    records, smoothed = records[:kept], np.empty((kept, 18))
+    if not start[LATE]:
+        _second_pass(work.params, start[BEGIN:], records, most, walk)
+    back()(records, smoothed)
     doubt = heading_doubt(Terms(*work.params[:N_TERMS]), work.state[N_RUNNER:])
-    spread()(work.params, work.turn, doubt, time, records[:kept], smoothed, out)
+    spread()(work.params, work.turn, doubt, time, records, smoothed, out)
     return flags, out
+
+
+def _second_pass(params: Array, begin: Array, records: Array, most: float, walk: float) -> None:
+    """Filter the epochs again, with the noise of headings that stand out raised, and the bias' own random walk."""
+    if most == 0.0 and walk == 1.0:
+        return
+    if most > 0.0:
+        seen = np.empty((len(records), 3))
+        residuals()(records, seen)
+        reweigh(params, records, seen, most)
+    changed = params.copy()
+    changed[Terms._fields.index("walk")] *= walk * walk
+    again()(changed, begin, records)
 
 
 def _spread(

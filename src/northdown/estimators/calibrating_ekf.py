@@ -85,8 +85,10 @@ true, set κ = 1 and the three sigmas to 0.
 
 Smoother
 --------
-`smooth` runs the same filter forth and the Modified Bryson–Frazier recursion back
-(see `_calibrating_back`), and spreads the corrections evenly between epochs.
+`smooth` runs the same filter forth and the Modified Bryson–Frazier recursion back (see `_calibrating_back`), then
+both once more over the epochs, and spreads the corrections evenly between epochs. The second pass weighs headings by
+the field as the smoothed attitude shows it, by what follows as well as by what was before, and by what they miss the
+smoothed trajectory by (see `_calibrating_weights`). The bias has `smooth_walk` of its random walk there.
 
 Sources: error in navigation axes: J. Solà, arXiv:1711.02508 (2017), section 7; velocity held near zero for tilt: the
 principle of the low-pass in an almost inertial frame of D. Laidig, T. Seel, Information Fusion 91 (2023),
@@ -139,7 +141,8 @@ class CalibratingEKF(CalibrationParameters):
     Notes
     -----
     `Orientation.diagnostics` has `field_departure` (u, or its mean, as the last heading was weighed; above 4.6 the
-    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s) and `still` (1 at rest).
+    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s) and `still` (1 at rest). From `smooth` they are those of its
+    first pass.
     """
 
     name = "calibrating-ekf"
@@ -207,7 +210,14 @@ class CalibratingEKF(CalibrationParameters):
 
         stream = self.stream(frame=frame or recording.frame)
         flags, out = smoother.smooth(
-            stream, recording, self.rest_window, self.rest_gyr, self.rest_acc, self.rest_rate
+            stream,
+            recording,
+            self.rest_window,
+            self.rest_gyr,
+            self.rest_acc,
+            self.rest_rate,
+            self.heading_outlier,
+            self.smooth_walk,
         )
         return Orientation._trusted(
             time=recording.time,

@@ -30,6 +30,24 @@ def add_row(s: Any, target: int, factor: float, source: int) -> None:
 
 
 @inline
+def add_three_rows(s: Any, target: int, factors: Any, source: int) -> None:
+    """Add the three rows from `source` on, each times its factor, to that at `target`, which is none of them."""
+    x, y, z = factors
+    for j in range(WIDTH):
+        s[target + j] += x * s[source + j] + y * s[source + WIDTH + j] + z * s[source + 2 * WIDTH + j]
+
+
+@inline
+def weigh_rows(s: Any, target: int, factors: Any, at: int, n: int, source: int) -> None:
+    """Row at `target` becomes the sum of the n rows from `source` on, times `factors`, an array, from `at` on."""
+    for j in range(WIDTH):
+        total = 0.0
+        for k in range(n):
+            total += factors[at + k] * s[source + k * WIDTH + j]
+        s[target + j] = total
+
+
+@inline
 def mirror_row(s: Any, cov: int, n: int, i: int) -> None:
     """Column i becomes row i."""
     for j in range(n):
