@@ -54,7 +54,7 @@ START = {
     "rest_noise": 2e-4,
     "rest_offset": 1e-4,
     "gyr_matrix": 1e-3,
-    "mag_delay_sigma": 0.01,
+    "mag_delay_sigma": 0.02,
     "smooth_walk": 1.0,
 }
 FEW = ("gyr_bias_walk", "mag_noise", "gate_power", "gyr_matrix", "mag_delay_sigma")

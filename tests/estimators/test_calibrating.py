@@ -41,10 +41,9 @@ def angle(a, b):
     return float((a * b.inv()).magnitude().max())
 
 
-@pytest.mark.parametrize(("delay", "sigma"), [(0.013, 0.01), (0.03, 0.05), (-0.008, 0.01)])
-def test_delay_of_the_magnetometer_is_found(delay, sigma):
-    filter_ = nd.CalibratingEKF(mag_delay_sigma=sigma)  # 30 ms are three sigmas of the default
-    found = filter_.run(sensors(4, seconds=60.0, delay=delay, noise=0.1)).diagnostics["mag_delay"][-1]
+@pytest.mark.parametrize("delay", [0.013, 0.03, -0.008])
+def test_delay_of_the_magnetometer_is_found(delay):
+    found = nd.CalibratingEKF().run(sensors(4, seconds=60.0, delay=delay, noise=0.1)).diagnostics["mag_delay"][-1]
     # s; the noise is a tenth of what the filter expects, whose own sigma is 1 ms by then
     assert found == pytest.approx(delay, abs=1e-3)
 
@@ -349,7 +348,7 @@ def test_other_estimators_say_that_they_do_not_smooth():
 
 # degrees, real time and smoothed: what was measured, and a tenth more
 BROAD = {
-    "05_undisturbed_slow_rotation_with_breaks_B": (0.62, 0.36),
+    "05_undisturbed_slow_rotation_with_breaks_B": (0.57, 0.36),
     "21_undisturbed_fast_combined": (1.52, 1.07),
     "29_disturbed_stationary_magnet_B": (1.29, 1.22),
 }

@@ -136,7 +136,7 @@ class CalibrationParameters(Estimator):
     rest_offset: float = parameter(1e-4, unit="rad/s", low=0.0)
     gyr_matrix: float = parameter(1e-3, low=0.0)
     mag_delay: float = parameter(0.0, unit="s", low=-0.05, high=0.05)
-    mag_delay_sigma: float = parameter(0.01, unit="s", low=0.0, high=0.05)
+    mag_delay_sigma: float = parameter(0.02, unit="s", low=0.0, high=0.05)
     calibration_time: float = parameter(36000.0, unit="s", above=0.0)
     epoch: float = parameter(0.04, unit="s", low=0.03, high=0.5)
     gyr_range: float = parameter(0.0, unit="rad/s", low=0.0)
