@@ -48,6 +48,8 @@ class Flag(enum.IntFlag):
     """The attitude is near one in which the method's angles are undefined; do not trust it."""
     ACC_REJECTED = 64
     """Linear acceleration is so strong that the accelerometer's sample was given less than a tenth of its weight."""
+    GYRO_CLIPPED = 128
+    """The gyroscope is at the end of its range: what the rate has more is lost, or was put back by guess."""
 
 
 # Optional fields with a vector in body axes for each sample.

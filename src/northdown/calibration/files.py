@@ -27,27 +27,22 @@ from __future__ import annotations
 import json
 import math
 import os
-import tomllib
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
-import numpy as np
-
-from northdown._validation import FloatArray
 from northdown.calibration.model import Calibration
 from northdown.calibration.part import SENSORS, Evidence, SensorCalibration, TemperatureSlope
 from northdown.errors import FormatError, InputError, expected
 from northdown.io.atomic import atomic_write
 from northdown.io.source import open_source, quoted
+from northdown.io.tables import Table, as_array, as_number, as_table, as_text, check_keys, parse_table, toml_value
 
 FORMAT: Final = "northdown calibration"
 VERSION: Final = 1
 SUFFIXES: Final = (".toml", ".json")
 _MAX_BYTES: Final = 1 << 18
 _MAX_NOTES: Final = 100
-
-Table = dict[str, Any]
 
 _PART_KEYS: Final = (
     "unit",
@@ -105,7 +100,7 @@ def load(path: str | os.PathLike[str]) -> Calibration:
     source = open_source(path, _MAX_BYTES)
     with source.open() as file:
         data = file.read(_MAX_BYTES)
-    table = _parse(data, source.label)
+    table = parse_table(data, source.label, "a calibration")
     if table.get("format") != FORMAT:
         do = "write calibrations with northdown.calibration.save"
         raise FormatError(expected(f"a calibration (format = {FORMAT!r})", f"none in {source.label}", do=do))
@@ -113,8 +108,8 @@ def load(path: str | os.PathLike[str]) -> Calibration:
     if isinstance(version, bool) or version != VERSION:
         got = f"version {quoted(version, 20)} in {source.label}"
         raise FormatError(expected(f"a calibration of version {VERSION}", got, do="update northdown"))
-    _check_keys("a calibration", table, ("format", "version", *SENSORS))
-    parts = {s: _read_part(s, _table(s, table[s])) for s in SENSORS if s in table}
+    check_keys("a calibration", table, ("format", "version", *SENSORS))
+    parts = {s: _read_part(s, as_table(s, table[s])) for s in SENSORS if s in table}
     if not parts:
         raise FormatError(expected("a calibration of gyr, acc or mag", f"none in {source.label}"))
     return Calibration(**parts)
@@ -144,106 +139,35 @@ def _as_table(part: SensorCalibration) -> Table:
 
 
 def _toml(tables: dict[str, Table]) -> str:
-    lines = [f"format = {_value(FORMAT)}", f"version = {VERSION}", "", "# calibrated = matrix · (raw − offset)"]
+    lines = [f"format = {toml_value(FORMAT)}", f"version = {VERSION}", "", "# calibrated = matrix · (raw − offset)"]
     for sensor, table in tables.items():
         lines += [f"[{sensor}]"]
-        lines += [f"{name} = {_value(v)}" for name, v in table.items() if not isinstance(v, dict)]
+        lines += [f"{name} = {toml_value(v)}" for name, v in table.items() if not isinstance(v, dict)]
         for name, inner in table.items():
             if isinstance(inner, dict):
-                lines += ["", f"[{sensor}.{name}]"] + [f"{key} = {_value(v)}" for key, v in inner.items()]
+                lines += ["", f"[{sensor}.{name}]"] + [f"{key} = {toml_value(v)}" for key, v in inner.items()]
         lines.append("")
     return "\n".join(lines)
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return '"' + "".join(_escaped(c) for c in value) + '"'
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    return repr(value)
-
-
-def _escaped(c: str) -> str:
-    if c in '"\\':
-        return "\\" + c
-    if ord(c) < 32 or ord(c) == 127:
-        return f"\\u{ord(c):04X}"
-    return c
-
-
-def _parse(data: bytes, label: str) -> Table:
-    try:
-        text = data.decode("utf-8-sig")
-        is_json = text.lstrip()[:1] == "{"
-        table = json.loads(text, parse_constant=_refuse) if is_json else tomllib.loads(text)
-    # the parsers raise ValueError for what they do not understand, RecursionError for nesting
-    except (ValueError, RecursionError) as error:
-        why = str(error).split("\n")[0][:100]
-        raise FormatError(
-            expected("a calibration in TOML or JSON", f"{label} ({why})", do="export it again")
-        ) from None
-    if not isinstance(table, dict):
-        raise FormatError(expected("a calibration in TOML or JSON", f"a list in {label}"))
-    return table
-
-
-def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number")
-
-
-def _check_keys(what: str, table: Table, known: tuple[str, ...]) -> None:
-    unknown = [key for key in table if key not in known]
-    if unknown:
-        raise FormatError(expected(f"{what} with only {', '.join(known)}", quoted(unknown[0])))
-
-
-def _table(name: str, value: Any) -> Table:
-    if not isinstance(value, dict):
-        raise FormatError(expected(f"{name} as a table", type(value).__name__))
-    return value
-
-
-def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise FormatError(expected(f"a number for {name}", quoted(value)))
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not abs(number) < 1e30:
-        raise FormatError(expected(f"a number below 1e30 for {name}", f"{number:g}"))
-    return number
-
-
-def _array(name: str, value: Any, columns: int, rows: int | None = None) -> FloatArray:
-    """Vector of 3 numbers, or matrix with some rows of 3."""
-    if not isinstance(value, list) or (rows is None and len(value) != columns):
-        raise FormatError(expected(f"{columns} numbers for {name}", quoted(value)))
-    if rows is None:
-        return np.array([_number(name, v) for v in value])
-    if not 1 <= len(value) <= rows:
-        raise FormatError(expected(f"{rows} rows for {name}", f"{len(value)}"))
-    return np.array([_array(name, row, columns) for row in value])
-
-
 def _read_part(sensor: str, table: Table) -> SensorCalibration:
-    _check_keys(f"[{sensor}]", table, _PART_KEYS)
+    check_keys(f"[{sensor}]", table, _PART_KEYS)
     for name in ("unit", "offset", "matrix"):
         if name not in table:
             raise FormatError(expected(f"{name} in [{sensor}]", "none"))
-    values: dict[str, Any] = {"unit": _text(f"unit in [{sensor}]", table["unit"])}
+    values: dict[str, Any] = {"unit": as_text(f"unit in [{sensor}]", table["unit"])}
     if not values["unit"]:
         raise FormatError(expected(f"unit in [{sensor}]", "an empty text"))
     for name, rows in (("offset", None), ("offset_sigma", None), ("matrix", 3), ("matrix_sigma", 3)):
         if name in table:
-            values[name] = _array(f"{name} in [{sensor}]", table[name], 3, rows)
+            values[name] = as_array(f"{name} in [{sensor}]", table[name], 3, rows)
     if "norm" in table:
-        values["norm"] = _number(f"norm in [{sensor}]", table["norm"])
+        values["norm"] = as_number(f"norm in [{sensor}]", table["norm"])
     try:
         if "temperature" in table:
-            values["temperature"] = _read_temperature(_table("temperature", table["temperature"]))
+            values["temperature"] = _read_temperature(as_table("temperature", table["temperature"]))
         if "evidence" in table:
-            values["evidence"] = _read_evidence(_table("evidence", table["evidence"]))
+            values["evidence"] = _read_evidence(as_table("evidence", table["evidence"]))
         return SensorCalibration(sensor, **values)
     except FormatError:
         raise
@@ -252,36 +176,30 @@ def _read_part(sensor: str, table: Table) -> SensorCalibration:
 
 
 def _read_temperature(table: Table) -> TemperatureSlope:
-    _check_keys("temperature", table, _TEMPERATURE_KEYS)
+    check_keys("temperature", table, _TEMPERATURE_KEYS)
     missing = [key for key in _TEMPERATURE_KEYS if key not in table]
     if missing:
         raise FormatError(expected(f"{missing[0]} of the temperature", "none"))
     return TemperatureSlope(
-        _number("reference", table["reference"]),
-        _array("coefficients", table["coefficients"], 3, 5),
-        _number("low", table["low"]),
-        _number("high", table["high"]),
+        as_number("reference", table["reference"]),
+        as_array("coefficients", table["coefficients"], 3, 5),
+        as_number("low", table["low"]),
+        as_number("high", table["high"]),
     )
 
 
 def _read_evidence(table: Table) -> Evidence:
-    _check_keys("evidence", table, _EVIDENCE_KEYS)
+    check_keys("evidence", table, _EVIDENCE_KEYS)
     values: dict[str, Any] = {"model": "given"}
     for name, value in table.items():
         if name in ("model", "quantity", "unit"):
-            values[name] = _text(name, value)
+            values[name] = as_text(name, value)
         elif name == "notes":
             if not isinstance(value, list) or len(value) > _MAX_NOTES:
                 raise FormatError(expected("a list of notes", quoted(value)))
-            values[name] = tuple(_text(name, v) for v in value)
+            values[name] = tuple(as_text(name, v) for v in value)
         elif name == "samples":
-            values[name] = int(_number(name, value))
+            values[name] = int(as_number(name, value))
         else:
-            values[name] = _number(name, value)
+            values[name] = as_number(name, value)
     return Evidence(**values)
-
-
-def _text(name: str, value: Any) -> str:
-    if not isinstance(value, str) or len(value) > 1000:
-        raise FormatError(expected(f"a text of at most 1000 characters for {name}", quoted(value)))
-    return value

@@ -18,6 +18,7 @@ from northdown.checks.base import (
     percent,
     run_bounds,
 )
+from northdown.kernels.clipping import CORNER, LONGEST_SWING, LOWEST_RANGE
 
 # Longest time (s) without a sample that does no harm: what the estimators' `max_gap` allows the gyroscope; what a
 # tilt and a heading survive on the gyroscope alone.
@@ -26,12 +27,11 @@ _PATIENCE = {"gyr": 0.1, "acc": 1.0, "mag": 5.0}
 _REPEATED = 0.05
 # A sensor that keeps the same value on all axes this long (s), over this many samples, is frozen.
 _FROZEN, _FROZEN_SAMPLES = 0.5, 20
-# Lowest level at which a sensor clips: gyroscopes have a range of 125 °/s or more, accelerometers must hold more
-# than gravity, magnetometers more than the field they are in.
-_GYR_RANGE = 2.0
+# Lowest level at which the others clip: accelerometers must hold more than gravity, magnetometers more than the
+# field they are in.
 _RANGE_OF_MEDIAN = {"acc": 1.3, "mag": 1.15}
-# A swing beyond the range lasts no longer than this (s); a turntable does.
-_SWING = 1.0
+# Samples at the level itself, or within a hundredth of it, that clipping leaves at least.
+_LEAST_EXACT, _LEAST_NEAR = 5, 10
 _UNITS = {"gyr": "rad/s", "acc": "m/s²", "mag": "µT"}
 
 
@@ -144,18 +144,8 @@ def _slower(
 def clipping(s: Signals) -> Iterator[Finding]:
     """Samples that pile up at the end of a sensor's range."""
     for name in s.sensors:
-        w = s.samples(name)
-        rows = np.flatnonzero(s.present[name])
-        fresh = np.concatenate(([True], ~s.repeated[name][1]))
-        w, rows = w[fresh], rows[fresh]
-        floor = _GYR_RANGE if name == "gyr" else _RANGE_OF_MEDIAN[name] * s.medians[name]
-        longest = _SWING / s.step if s.step > 0.0 else math.inf
-        found = [
-            (axis, sign, level, where)
-            for axis in range(3)
-            for sign in (1.0, -1.0)
-            for level, where in _clipped(sign * w[:, axis], floor, longest)
-        ]
+        w, rows = _fresh(s, name)
+        found = list(_clipped_sides(s, name, w))
         if not found:
             continue
         hit = np.unique(np.concatenate([where for *_, where in found]))
@@ -169,6 +159,48 @@ def clipping(s: Signals) -> Iterator[Finding]:
             f"{s.where(at)}; what exceeded the range is lost: record with a wider range",
             at,
         )
+
+
+def gyr_levels(time: FloatArray, gyr: FloatArray) -> FloatArray:
+    """Largest rate of each axis that is clipped, (3, 2) for its positive and negative side; infinite elsewhere."""
+    levels = np.full((3, 2), math.inf)
+    if any(_may_clip(sign * axis) for axis in gyr.T.copy() for sign in (1.0, -1.0)):  # the quick way out
+        signals = Signals(time, gyr, None, None, "NED", "")
+        w, _ = _fresh(signals, "gyr")
+        for axis, sign, _, where in _clipped_sides(signals, "gyr", w):
+            levels[axis, 0 if sign > 0.0 else 1] = (sign * w[where, axis]).max()
+    return levels
+
+
+def _may_clip(x: FloatArray) -> bool:
+    """Whether enough samples of an axis of a gyroscope are near its largest for `_clipped` to find it clipped."""
+    top = float(x.max(initial=-math.inf))
+    if math.isnan(top):
+        top = float(np.nanmax(x, initial=-math.inf))
+    if not LOWEST_RANGE < top < math.inf:
+        return False
+    near, high = np.count_nonzero(x >= 0.99 * top), np.count_nonzero(x >= 0.95 * top)
+    # repeats are not left out yet, so that the second condition is only half of the one there
+    return bool((near >= _LEAST_NEAR and near >= high - near) or np.count_nonzero(x == top) >= _LEAST_EXACT)
+
+
+def _fresh(s: Signals, name: str) -> tuple[FloatArray, IndexArray]:
+    """Samples of a sensor that do not repeat the one before on all axes, and their rows."""
+    same = s.repeated[name][1]
+    if not same.any():
+        return s.samples(name), np.flatnonzero(s.present[name])
+    fresh = np.concatenate(([True], ~same))
+    return s.samples(name)[fresh], np.flatnonzero(s.present[name])[fresh]
+
+
+def _clipped_sides(s: Signals, name: str, w: FloatArray) -> Iterator[tuple[int, float, float, IndexArray]]:
+    """Axis, sign, level and samples of what is clipped among the fresh samples w of a sensor."""
+    floor = LOWEST_RANGE if name == "gyr" else _RANGE_OF_MEDIAN[name] * s.medians[name]
+    longest = LONGEST_SWING / s.step if s.step > 0.0 else math.inf
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            for level, where in _clipped(sign * w[:, axis], floor, longest):
+                yield axis, sign, level, where
 
 
 def _level(name: str, value: float) -> str:
@@ -189,22 +221,20 @@ def _clipped(x: FloatArray, floor: float, longest: float) -> Iterator[tuple[floa
     exact = high[x[high] == top]
     start, stop = run_bounds(x == top)
     # Clipping piles samples up at one value. The 50 levels keep out a coarse sensor at the top of a slow swing.
-    piled = len(exact) >= 5 and (stop - start).max() >= 3 and len(exact) > len(high) - len(exact)
+    piled = len(exact) >= _LEAST_EXACT and (stop - start).max() >= 3 and len(exact) > len(high) - len(exact)
     if piled and len(np.unique(x[x > 0.5 * top])) >= 50:
         yield top, exact
         return
     # After calibration the clipped value is no longer one value, but still much rarer just below.
-    if len(near) < 10 or len(near) < 2 * (len(high) - len(near)):
+    if len(near) < _LEAST_NEAR or len(near) < 2 * (len(high) - len(near)):
         return
     start, stop = run_bounds(x >= 0.99 * top)
     inner = (stop - start >= 3) & (start >= 2) & (stop <= len(x) - 2)
     start, stop = start[inner], stop[inner]
     if len(start) < 2 or np.median(stop - start) > longest:  # a body that turns steadily
         return
-    # It is reached with a corner: a smooth peak that spends L samples in its top 1 % comes and goes with slopes of
-    # 4 % / L of it for each sample.
     slope = 0.5 * (x[start - 1] - x[start - 2] + x[stop] - x[stop + 1])
-    if np.median(slope * (stop - start)) > 3.0 * 0.04 * top:
+    if np.median(slope * (stop - start)) > CORNER * top:
         yield float(np.median(x[near])), near
 
 

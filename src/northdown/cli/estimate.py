@@ -16,6 +16,9 @@ from northdown.cli.summary import summarise
 from northdown.errors import InputError, expected
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from northdown.estimators import Estimator, LearntCalibration
     from northdown.orientation import Orientation
     from northdown.recording import Recording
 
@@ -39,6 +42,14 @@ def estimate(
     offline: Annotated[
         bool, typer.Option("--offline", help="Use the whole recording, past and future, for each sample.")
     ] = False,
+    learnt: Annotated[
+        str | None,
+        typer.Option("--learnt", metavar="FILE", help="Begin with what was learnt before (calibrating-ekf)."),
+    ] = None,
+    save_learnt: Annotated[
+        str | None,
+        typer.Option("--save-learnt", metavar="FILE", help="Write what is learnt of the sensors: .toml or .json."),
+    ] = None,
     max_gap: gate.MaxGap = gate.MAX_GAP_TEXT,
     force: gate.Force = False,
 ) -> None:
@@ -55,20 +66,51 @@ def estimate(
         check_target("--output", output, source=reading.source, suffixes=ORIENTATION_SUFFIXES)
     if plot is not None:
         check_target("--plot", plot, source=reading.source, suffixes=FIGURE_SUFFIXES)
+    if save_learnt is not None:
+        check_target("--save-learnt", save_learnt, source=reading.source, suffixes=(".toml", ".json"))
+    warm = learnt is not None or save_learnt is not None
+    begin = _learning(configured, learnt) if warm else None
     longest = gate.read_max_gap(max_gap)
     recording = reading.load()
     check_sensors(chosen, recording)
     gate.admit(recording, [chosen], max_gap=longest, force=force)
-    orientation = configured.smooth(recording) if offline else configured.run(recording, max_gap=longest)
+    if begin is not None:
+        orientation, found = begin(recording, offline, longest)
+        if save_learnt is not None:
+            found.save(save_learnt)
+    else:
+        orientation = configured.smooth(recording) if offline else configured.run(recording, max_gap=longest)
     rows = summarise(recording, configured, orientation, offline=offline)
     if output is not None:
         write_orientation(orientation, output)
     if plot is not None:
         _draw(orientation, recording, plot)
-    written = [name for name in (output, plot) if name not in (None, "-")]
+    written = [name for name in (output, plot, save_learnt) if name not in (None, "-")]
     if written:
         rows.append(("Written", ", ".join(str(name) for name in written)))
     console.facts(rows, sys.stderr if output == "-" else sys.stdout)
+
+
+def _learning(
+    configured: Estimator, learnt: str | None
+) -> Callable[[Recording, bool, float], tuple[Orientation, LearntCalibration]]:
+    """The run of an estimator that begins with the file `learnt`, if there is one, and also gives what it learns.
+
+    Raises
+    ------
+    InputError
+        When the estimator learns nothing, or the file is not one of what was learnt.
+    """
+    from northdown.estimators import LearntCalibration
+    from northdown.estimators.calibrating_ekf import CalibratingEKF
+
+    if not isinstance(configured, CalibratingEKF):
+        what = f"{CalibratingEKF.name} for --learnt and --save-learnt"
+        raise InputError(expected(what, configured.name, do=f"choose -e {CalibratingEKF.name}"))
+    known = None if learnt is None else LearntCalibration.load(learnt)
+    return lambda recording, offline, longest: configured.learn(
+        recording, known=known, offline=offline, max_gap=longest
+    )
 
 
 def _draw(orientation: Orientation, recording: Recording, path: str) -> None:

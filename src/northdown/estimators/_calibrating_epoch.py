@@ -8,6 +8,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from northdown.estimators._calibrating_acceleration import (
+    LOST_WITHIN,
+    coasted,
+    speed_is_of_rest,
+    watch_acceleration,
+)
 from northdown.estimators._calibrating_field import judge_field
 from northdown.estimators._calibrating_iron import forget_iron, look_for_iron
 from northdown.estimators._calibrating_layout import (
@@ -20,6 +26,7 @@ from northdown.estimators._calibrating_layout import (
     BLOCKS,
     CLIPPED,
     CLOSED,
+    COASTED,
     COUNT_MAG,
     COV,
     DELAY,
@@ -34,9 +41,13 @@ from northdown.estimators._calibrating_layout import (
     GYR_BIAS,
     GYR_MATRIX,
     HEADING_SLOPE,
+    LAST_FORCE,
+    LOST,
+    LOW_FORCE,
     MAG_DELAY,
     MATRIX,
     MEAN_DEPARTURE,
+    MISSED,
     MOTION,
     N_BLOCK,
     N_BLOCKS,
@@ -60,7 +71,7 @@ from northdown.estimators._calibrating_layout import (
 )
 from northdown.estimators._calibrating_take import forget_taken, take_heading, take_rest, take_velocity
 from northdown.kernels.jit import inline
-from northdown.kernels.quaternion import multiply, normalize
+from northdown.kernels.quaternion import multiply, normalize, rotate
 from northdown.kernels.rows import WIDTH, add_row, copy_row, mirror_row
 from northdown.kernels.so3 import exp
 from northdown.kernels.stillness import CONTRADICTED, is_near, is_quiet, kind_of_rest, noise_density
@@ -68,8 +79,6 @@ from northdown.kernels.stillness import CONTRADICTED, is_near, is_quiet, kind_of
 LONGEST_FIELD: Final = 1.0
 """The same for the magnetometer: a field seen rarely is worth no more than one seen once a second."""
 LARGEST_DELAY: Final = 0.05
-CLIPPED_RATE: Final = 0.3
-"""Standard deviation of what a clipped rate lacks, as a part of the range."""
 REST_GATE: Final = 4.0
 """Sigmas by which an epoch's mean rate may miss that of rest."""
 PARALLEL: Final = 1e-6
@@ -87,6 +96,8 @@ def clear_sums(s: Any) -> None:
 def close_epoch(p: Any, s: Any) -> None:
     """End of an epoch: propagate the covariance, take the measurements, correct the nominal values."""
     time = s[TIME]
+    s[COASTED], s[LOST] = coasted(s, time), s[MISSED]
+    s[MISSED] = 0.0
     propagate(p, s, time)
     for a in range(3):
         s[SPEED + a] += s[SHIFT + a]
@@ -94,7 +105,7 @@ def close_epoch(p: Any, s: Any) -> None:
         s[STILL] = _rest_in_window(p, s)
     rest = max(p.rest_bias, s[DENSITY]) / time
     s[WIDENED] = 0.0
-    still = s[STILL] > 0.0 and (_rate_is_of_rest(s, rest) or _bias_is_contradicted(p, s))
+    still = s[STILL] > 0.0 and speed_is_of_rest(p, s) and (_rate_is_of_rest(s, rest) or _bias_is_contradicted(p, s))
     s[STILL] = 1.0 if still else 0.0
     for j in range(WIDTH):
         s[ERROR + j] = 0.0
@@ -102,6 +113,7 @@ def close_epoch(p: Any, s: Any) -> None:
     if s[TIME_ACC] > 0.0:
         r = p.rest_speed if still else p.speed * (1.0 + p.speed_motion * s[MOTION])
         r /= s[TIME_ACC]
+        watch_acceleration(p, s, time, r, still)
         for a in range(3):
             take_velocity(s, a, r, -s[SPEED + a])
     if s[COUNT_MAG] > 0.0:
@@ -186,14 +198,16 @@ def propagate(p: Any, s: Any, time: float) -> None:
     for a in range(3):
         mirror_row(s, COV, N, ATTITUDE + a)
         mirror_row(s, COV, N, VELOCITY + a)
-    angle = p.gyr * time + p.scale * s[RATE_SQUARE]
-    if s[CLIPPED] > 0.0:
-        angle += (CLIPPED_RATE * p.gyr_range * s[CLIPPED]) ** 2
+    angle = p.gyr * time + p.scale * s[RATE_SQUARE] + s[LOST]
+    for a in range(3):
+        for b in range(3):
+            s[COV + (ATTITUDE + a) * WIDTH + ATTITUDE + b] += s[CLIPPED + a] * s[CLIPPED + b]
     drift = p.velocity * (time + p.velocity_motion * s[ACC_SQUARE])
+    drift += s[COASTED]
     forget = time / p.calibration_time
     for a in range(3):
         s[COV + (ATTITUDE + a) * (WIDTH + 1)] += angle
-        s[COV + (BIAS + a) * (WIDTH + 1)] += p.walk * time
+        s[COV + (BIAS + a) * (WIDTH + 1)] += p.walk * time + s[LOST] / LOST_WITHIN**2
         s[COV + (VELOCITY + a) * (WIDTH + 1)] += drift
         s[COV + (OFFSET + a) * (WIDTH + 1)] += p.offset * forget
         for k in range(3):
@@ -263,8 +277,11 @@ def _weigh_heading(p: Any, s: Any) -> None:
 def _correct(s: Any) -> None:
     """Put the error into the nominal values."""
     d = (s[ERROR], s[ERROR + 1], s[ERROR + 2])
-    q = normalize(multiply(exp(d), (s[0], s[1], s[2], s[3])))
+    turn = exp(d)
+    q = normalize(multiply(turn, (s[0], s[1], s[2], s[3])))
     s[0], s[1], s[2], s[3] = q
+    for at in (LOW_FORCE, LAST_FORCE):
+        s[at], s[at + 1], s[at + 2] = rotate(turn, (s[at], s[at + 1], s[at + 2]))
     for a in range(3):
         s[GYR_BIAS + a] += s[ERROR + BIAS + a]
         s[SPEED + a] += s[ERROR + VELOCITY + a]

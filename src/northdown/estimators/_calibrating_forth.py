@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
@@ -22,6 +23,7 @@ from northdown.estimators._calibrating_layout import (
     GIVEN,
     GYR_BIAS,
     MAG_DELAY,
+    MOTION,
     N_MOVE,
     N_TAKEN,
     RATE,
@@ -54,7 +56,7 @@ Array = npt.NDArray[np.float64]
 RATE_N: Final = 7
 """Where the rate in navigation axes stands in the output on the way forth; on the way back the covariance does."""
 DIAGNOSTICS: Final = 19
-"""Where departure of the field, delay and stillness stand in the output."""
+"""Where departure of the field, delay, stillness and acceleration stand in the output."""
 
 # What is kept of an epoch.
 END: Final = 0  # index of its last sample
@@ -145,11 +147,10 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
                     start[BEGIN + j] = s[COV + j]
             for j in range(4):
                 out[i, j] = s[j]
-            out[i, DIAGNOSTICS], out[i, DIAGNOSTICS + 1], out[i, DIAGNOSTICS + 2] = (
-                s[DEPARTURE],
-                s[MAG_DELAY],
-                s[STILL],
-            )
+            out[i, DIAGNOSTICS] = s[DEPARTURE]
+            out[i, DIAGNOSTICS + 1] = s[MAG_DELAY]
+            out[i, DIAGNOSTICS + 2] = s[STILL]
+            out[i, DIAGNOSTICS + 3] = math.sqrt(s[MOTION])
             rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
             for j in range(3):
                 out[i, RATE_N + j] = rate_n[j]

@@ -39,16 +39,18 @@ TIME_ACC: Final = 42
 COUNT_MAG: Final = 43
 RATE_SQUARE: Final = 44
 ACC_SQUARE: Final = 45
-CLIPPED: Final = 46  # time in which the gyroscope was at the end of its range
-TURN: Final = 47  # Σ R dt by rows
-SCALED: Final = 56  # Σ R r_k dt in motion, three matrices by rows, one after the other
-REST_TURN: Final = 83  # Σ R dt at rest
-FORCE: Final = 92  # Σ R a dt
-N_MOVE: Final = 54  # numbers from TIME to FORCE
-SHIFT: Final = 95  # Σ (R a + g) dt
-FIELD_SUM: Final = 98
-FIELD_SLOPE: Final = 101  # its derivative with respect to the delay
-BLOCK: Final = 104  # the epoch's statistics, as `kernels.stillness` keeps them
+CLIPPED: Final = 46  # standard deviation of the angle lost at the end of the range, navigation axes
+COASTED: Final = 49  # what acceleration that lasts adds to the variance of velocity
+LOST: Final = 50  # what an attitude that must be wrong adds to its variance
+TURN: Final = 51  # Σ R dt by rows
+SCALED: Final = 60  # Σ R r_k dt in motion, three matrices by rows, one after the other
+REST_TURN: Final = 87  # Σ R dt at rest
+FORCE: Final = 96  # Σ R a dt
+N_MOVE: Final = 58  # numbers from TIME to FORCE
+SHIFT: Final = 99  # Σ (R a + g) dt
+FIELD_SUM: Final = 102
+FIELD_SLOPE: Final = 105  # its derivative with respect to the delay
+BLOCK: Final = 108  # the epoch's statistics, as `kernels.stillness` keeps them
 N_BLOCK: Final = 10
 SUMS_END: Final = BLOCK + N_BLOCK
 
@@ -64,8 +66,35 @@ BLOCK_HEAD: Final = RING + 4 * N_RING
 BLOCKS: Final = BLOCK_HEAD + 1
 N_BLOCKS: Final = 64
 
+# The gyroscope at the end of its range; entries for three axes, or for the two sides of each.
+LEVELS: Final = BLOCKS + N_BLOCKS * N_BLOCK  # from where on it clips; infinite where it does not
+PEAKS: Final = LEVELS + 6  # largest rate seen, where clipping was looked for
+LAST_GYR: Final = PEAKS + 6
+AGE_GYR: Final = LAST_GYR + 3  # time since its output last changed
+ALERT: Final = AGE_GYR + 1  # rate below which there is nothing to watch
+CLIPPING: Final = ALERT + 1  # for how long any axis has been clipped
+SLOPE: Final = CLIPPING + 1  # change between the last two samples, rad/s²
+QUANTUM: Final = SLOPE + 3  # least change seen on any axis; NaN at first
+HELD_TIME: Final = QUANTUM + 1  # for how long an axis alone has repeated its value
+HELD_SLOPE: Final = HELD_TIME + 3  # how it came there
+CLIP_TIME: Final = HELD_SLOPE + 3  # for how long an axis has been clipped; 0 where it is not
+CLIP_SLOPE: Final = CLIP_TIME + 3  # how it came there
+CLIP_ADDED: Final = CLIP_SLOPE + 3  # angle added meanwhile
+
+# Acceleration that lasts.
+LOW_FORCE: Final = CLIP_ADDED + 3  # specific force, navigation axes, low-passed
+NORM: Final = LOW_FORCE + 3  # norm of that to compare with, and for how long it has been learnt
+SURPRISE: Final = NORM + 2  # mean square of the velocity's innovation in units of its variance
+HOLD: Final = SURPRISE + 1  # for how long yet the accelerometer is not believed
+TRAVEL: Final = HOLD + 1  # how surely the body is a vehicle
+LAST_FORCE: Final = TRAVEL + 1  # of the last epoch
+FORCE_CHANGE: Final = LAST_FORCE + 3  # mean square of its change from epoch to epoch
+HELD: Final = FORCE_CHANGE + 1  # time of holds
+PATIENCE: Final = HELD + 1  # time until a hold may begin for which force gives no reason
+MISSED: Final = PATIENCE + 1  # variance of an attitude that has been found wrong, for the next epoch
+
 # What the field says of iron on the body: sums, and what follows from them.
-IRON: Final = BLOCKS + N_BLOCKS * N_BLOCK
+IRON: Final = MISSED + 1
 IRON_TURN: Final = IRON + 16  # heading by which it would turn the field on average
 IRON_KNOWN: Final = IRON_TURN + 1  # part of the variance of that heading that is no longer open
 
@@ -93,6 +122,7 @@ class Terms(NamedTuple):
     speed: float
     speed_motion: float
     motion_window: float
+    acc_gate: float
     mag: float
     norm_gate: float
     dip_gate: float
@@ -106,7 +136,6 @@ class Terms(NamedTuple):
     rest_window: float
     rest_speed: float
     rest_bias: float
-    gyr_range: float
     gyr_delay: float
     gravity: float
     epoch: float

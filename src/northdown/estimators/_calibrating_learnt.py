@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
 
 from northdown._validation import FloatArray, as_float_array, check_no_infinity, check_number
 from northdown.errors import InputError, expected
+from northdown.estimators import _calibrating_files as files
 from northdown.estimators._calibrating_layout import (
     BIAS,
     COV,
@@ -71,6 +73,34 @@ class LearntCalibration:
         object.__setattr__(self, "mag_delay", delay)
         sigma = check_number("mag_delay_sigma", self.mag_delay_sigma, low=0.0, unit="s")
         object.__setattr__(self, "mag_delay_sigma", sigma)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write to a file; an existing one is replaced at once, or not at all.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            Name that ends in ``.toml`` or ``.json``.
+
+        Raises
+        ------
+        InputError
+            When the name has another ending, or the system refuses to write.
+        """
+        files.save(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> LearntCalibration:
+        """Read what `save` has written, TOML or JSON by its content.
+
+        Raises
+        ------
+        FormatError
+            When the content is something else, damaged, or its numbers are not what they should be.
+        InputError
+            When the file is missing, empty, or larger than 64 KiB.
+        """
+        return files.load(path)
 
 
 def learnt(stream: Stream) -> LearntCalibration:

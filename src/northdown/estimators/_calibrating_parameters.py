@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from northdown.estimators._calibrating_layout import Terms
@@ -37,6 +36,9 @@ class CalibrationParameters(Estimator):
         and after motion.
     motion_window : float
         Time constant (s) of that mean. Raising it distrusts for longer after each acceleration.
+    acc_gate : float
+        By how much specific force, averaged, must be more than usual for acceleration that lasts to be seen, m/s².
+        Raising it lets stronger accelerations tilt the attitude, and is misled less by a badly calibrated sensor.
     mag_noise : float
         Noise density of the heading from the magnetometer, rad/√Hz. Raising it makes heading follow more slowly.
     norm_gate : float
@@ -81,8 +83,8 @@ class CalibrationParameters(Estimator):
     epoch : float
         Time between measurement updates, s. Raising it is faster, and coarser.
     gyr_range : float
-        Rate at which the gyroscope clips, rad/s; 0 when that is not known. Raising it beyond what the sensor can do
-        has no effect, as a lack of it.
+        Rate at which the gyroscope clips, rad/s; 0 to find it from the data. Raising it beyond what the sensor can do
+        makes clipping go unseen.
     gyr_delay : float
         Delay of the gyroscope behind the time of its samples, s; the attitude is turned on by as much. Raising it
         turns further ahead. No other sensor can tell: give it only when it is known.
@@ -121,6 +123,7 @@ class CalibrationParameters(Estimator):
     speed_noise: float = parameter(0.05, unit="m/s/√Hz", above=0.0)
     speed_motion: float = parameter(0.1, unit="s⁴/m²", low=0.0)
     motion_window: float = parameter(1.0, unit="s", above=0.0)
+    acc_gate: float = parameter(0.15, unit="m/s²", above=0.0)
     mag_noise: float = parameter(0.02, unit="rad/√Hz", above=0.0)
     norm_gate: float = parameter(0.05, above=0.0)
     dip_gate: float = parameter(0.05, unit="rad", above=0.0)
@@ -162,6 +165,7 @@ class CalibrationParameters(Estimator):
             speed=self.speed_noise**2,
             speed_motion=self.speed_motion,
             motion_window=self.motion_window,
+            acc_gate=self.acc_gate,
             mag=self.mag_noise**2,
             norm_gate=self.norm_gate,
             dip_gate=self.dip_gate,
@@ -175,7 +179,6 @@ class CalibrationParameters(Estimator):
             rest_window=self.rest_window,
             rest_speed=REST_SPEED,
             rest_bias=self.rest_noise**2,
-            gyr_range=self.gyr_range if self.gyr_range > 0.0 else math.inf,
             gyr_delay=self.gyr_delay,
             gravity=self.gravity,
             epoch=self.epoch,

@@ -10,9 +10,12 @@ from northdown.estimators._calibrating_iron import forget_iron, heading_doubt
 from northdown.estimators._calibrating_layout import (
     ATTITUDE,
     BIAS,
+    CLIPPING,
     COV,
     DEPARTURE,
+    HOLD,
     MAG_DELAY,
+    MOTION,
     RATE,
     STILL,
     VELOCITY,
@@ -27,6 +30,8 @@ from northdown.kernels.so3 import exp
 from northdown.kernels.weighting import REJECTED
 from northdown.orientation import Flag
 
+_ACC_REJECTED = int(Flag.ACC_REJECTED)
+_GYRO_CLIPPED = int(Flag.GYRO_CLIPPED)
 _MAG_REJECTED = int(Flag.MAG_REJECTED)
 DIAGONAL: Final = WIDTH + 1
 """From one diagonal entry of a covariance to the next."""
@@ -82,7 +87,7 @@ def ahead(t: Terms, q: Any, rate_n: Any) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, field's departure u, delay, stillness."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, u, delay, stillness, acceleration."""
     t = Terms(*p)
     row = COV + WIDTH
     p_upper = (s[COV], s[COV + 1], s[COV + 2], s[row + 1], s[row + 2], s[row + WIDTH + 2])
@@ -92,10 +97,15 @@ def output(p: Any, s: Any) -> Any:
     sigma = (math.sqrt(s[at]), math.sqrt(s[at + DIAGONAL]), math.sqrt(s[at + 2 * DIAGONAL]))
     q = ahead(t, (s[0], s[1], s[2], s[3]), rate_n)
     nominal = q + (s[4], s[5], s[6])
-    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL])
+    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL], math.sqrt(s[MOTION]))
 
 
 @inline
 def flagged(p: Any, s: Any) -> int:
-    """Whether the field of the last epoch was all but rejected."""
-    return _MAG_REJECTED if s[DEPARTURE] > REJECTED else 0
+    """Whether the field of the last epoch was all but rejected, the gyroscope clips, acceleration lasts."""
+    flags = _MAG_REJECTED if s[DEPARTURE] > REJECTED else 0
+    if s[CLIPPING] > 0.0:
+        flags |= _GYRO_CLIPPED
+    if s[HOLD] > 0.0:
+        flags |= _ACC_REJECTED
+    return flags

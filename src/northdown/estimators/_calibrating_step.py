@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from northdown.estimators._calibrating_clip import add_lacking, unclipped
 from northdown.estimators._calibrating_epoch import clear_sums, close_epoch
 from northdown.estimators._calibrating_layout import (
     ACC_SQUARE,
     AGE_ACC,
     AGE_MAG,
     BLOCK,
-    CLIPPED,
+    CLIPPING,
     CLOCK,
     CLOSED,
     COUNT_MAG,
@@ -50,8 +51,6 @@ from northdown.kernels.turn import columns
 
 LONGEST_FORCE: Final = 0.1
 """Longest time (s) for which one accelerometer sample is taken to stand."""
-NEARLY: Final = 0.99
-"""Part of the gyroscope's range from which a sample counts as clipped."""
 RING_STEP: Final = 2e-3
 """Shortest time (s) between the attitudes that are kept for the magnetometer's delay."""
 
@@ -63,16 +62,19 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     if s[CLOSED] > 0.0:
         clear_sums(s)
     s[TIME] += dt
-    rate = _rate(s, dt, gyr)
+    gyr, lost = unclipped(s, dt, gyr)
+    rate = _rate(s, dt, gyr, lost)
     s[RATE], s[RATE + 1], s[RATE + 2] = rate
     q = (s[0], s[1], s[2], s[3])
     if dt > 0.0:
-        q = normalize(multiply(q, exp((rate[0] * dt, rate[1] * dt, rate[2] * dt))))
+        turn = (rate[0] * dt + lost[0], rate[1] * dt + lost[1], rate[2] * dt + lost[2])
+        q = normalize(multiply(q, exp(turn)))
         s[0], s[1], s[2], s[3] = q
-        _add_turn(s, dt, columns(q), gyr)
+        c = columns(q)
+        _add_turn(s, dt, c, gyr)
+        if s[CLIPPING] > 0.0:
+            add_lacking(s, dt, c)
         s[RATE_SQUARE] += dot(rate, rate) * dt
-        if max(abs(gyr[0]), abs(gyr[1]), abs(gyr[2])) >= NEARLY * p.gyr_range:
-            s[CLIPPED] += dt
     s[AGE_ACC] += dt
     s[AGE_MAG] += dt
     if is_sample(acc):
@@ -98,7 +100,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
 
 
 @inline
-def _rate(s: Any, dt: float, gyr: Any) -> Any:
+def _rate(s: Any, dt: float, gyr: Any, lost: Any) -> Any:
     """Angular rate; also remembers the turn for the magnetometer's delay."""
     if s[GIVEN] >= 0.0:
         s[STILL] = s[GIVEN]
@@ -114,7 +116,7 @@ def _rate(s: Any, dt: float, gyr: Any) -> Any:
         )
     s[CLOCK] += dt
     for a in range(3):
-        s[TURNED + a] += rate[a] * dt
+        s[TURNED + a] += rate[a] * dt + lost[a]
     head = int(s[HEAD])
     if s[CLOCK] - s[RING + 4 * head] >= RING_STEP:
         head = (head + 1) % N_RING

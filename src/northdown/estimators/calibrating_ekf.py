@@ -64,9 +64,23 @@ A field that is all but rejected (u > 4.6) and steady for `field_new` of motion 
 
 *Rest.* Where both sensors hardly scatter for `rest_window` (before the sample in real time, around it in `smooth`)
 and the mean rate is within `rest_rate` of the bias known, and the epoch's own mean within four sigmas, the mean rate
-is b + e with variance `rest_noise`²/T, or what the scatter shows if that is more, and the velocity is zero. Where the
+is b + e with variance `rest_noise`²/T, or what the scatter shows if that is more, and the velocity is zero; but not
+where the velocity contradicts that. Where the
 mean rate is within `rest_rate` of zero instead, it is b that is wrong, and its covariance is widened by the square of
 what it misses by.
+
+Acceleration that lasts
+-----------------------
+Where the velocity's innovation and the norm of specific force show that the body travels, the filter coasts on its
+gyroscope; see `_calibrating_acceleration`. Such samples are flagged `ACC_REJECTED`.
+
+Clipping
+--------
+Where the gyroscope is at the end of its range (`gyr_range`, or found from the data for each side of each axis), what
+it seems to lack is put back, and its uncertainty counts about that axis; see `_calibrating_clip`. `run` and `smooth`
+find the range from the whole recording; a live stream finds it at the first plateau of a repeated value that was
+entered with a corner. `run(recording)` is ``for_recording(recording).stream().run(recording)``. Such samples are
+flagged `GYRO_CLIPPED`.
 
 Covariance
 ----------
@@ -98,24 +112,31 @@ doi:10.1080/00207177308932487. The states for matrix, delay and rest, and the we
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from northdown._validation import FloatArray
+from northdown.checks.sensors import gyr_levels
 from northdown.errors import InputError, expected
+from northdown.estimators._calibrating_clip import alert, restored
 from northdown.estimators._calibrating_layout import (
+    ALERT,
     ATTITUDE,
     BIAS,
     COV,
     DELAY,
     GIVEN,
+    LEVELS,
     MAG_DELAY,
     MATRIX,
     N_STATE,
     OFFSET,
+    QUANTUM,
     VELOCITY,
     N,
     Terms,
@@ -126,7 +147,7 @@ from northdown.estimators._calibrating_result import DIAGONAL, START_SPEED, alig
 from northdown.estimators._calibrating_step import step
 from northdown.estimators._stream import Stream, outputs
 from northdown.frames import Frame
-from northdown.kernels.runner import Kernel
+from northdown.kernels.runner import N_RUNNER, Kernel
 from northdown.orientation import Orientation
 from northdown.recording import Recording
 
@@ -141,9 +162,11 @@ class CalibratingEKF(CalibrationParameters):
     Notes
     -----
     `Orientation.diagnostics` has `field_departure` (u, or its mean, as the last heading was weighed; above 4.6 the
-    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s) and `still` (1 at rest). From `smooth` they are those of its
-    first pass.
+    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s), `still` (1 at rest) and `acceleration`, the root of the
+    mean square of linear acceleration over `motion_window`, m/s². From `smooth` they are those of its first pass.
     """
+
+    _levels: ClassVar[tuple[float, ...]] = (math.inf,) * 6
 
     name = "calibrating-ekf"
     smooths = True
@@ -152,7 +175,7 @@ class CalibratingEKF(CalibrationParameters):
         step,
         n_params=len(Terms._fields),
         n_state=N_STATE,
-        n_out=22,
+        n_out=23,
         output=output,
         aligned=aligned,
         flagged=flagged,
@@ -166,6 +189,7 @@ class CalibratingEKF(CalibrationParameters):
         "field_departure": slice(19, 20),
         "mag_delay": slice(20, 21),
         "still": slice(21, 22),
+        "acceleration": slice(22, 23),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:
@@ -184,9 +208,55 @@ class CalibratingEKF(CalibrationParameters):
         sigma2[OFFSET : OFFSET + 3] = p.offset
         sigma2[DELAY] = p.delay
         s[COV + np.arange(N) * DIAGONAL] = sigma2
+        s[LEVELS : LEVELS + 6] = self._levels if self.gyr_range == 0.0 else self.gyr_range
+        s[QUANTUM] = math.nan
+        s[ALERT] = alert(s)
         return tuple(s[4:])
 
-    def smooth(self, recording: Recording, *, frame: str | None = None) -> Orientation:
+    def for_recording(self, recording: Recording) -> CalibratingEKF:
+        """Copy that knows where the gyroscope of a recording clips, if `gyr_range` is not given."""
+        if self.gyr_range > 0.0 or recording.gyr is None:
+            return self
+        levels = gyr_levels(recording.time, recording.gyr)
+        if not np.isfinite(levels).any():
+            return self
+        this = dataclasses.replace(self)
+        object.__setattr__(this, "_levels", tuple(levels.ravel().tolist()))
+        return this
+
+    def run(
+        self,
+        recording: Recording,
+        *,
+        frame: str | None = None,
+        initial: Rotation | None = None,
+        max_gap: float = 0.1,
+        known: LearntCalibration | None = None,
+    ) -> Orientation:
+        """Estimate the orientation over a recording.
+
+        Parameters
+        ----------
+        recording, frame, initial, max_gap
+            As for `Estimator.run`.
+        known : LearntCalibration, optional
+            What was learnt of these sensors before; see `warm_stream`.
+
+        Returns
+        -------
+        Orientation
+            As from `Estimator.run`.
+
+        Raises
+        ------
+        InputError
+            As for `Estimator.run`.
+        """
+        return self._begun(recording, frame, known, initial, max_gap).run(recording)
+
+    def smooth(
+        self, recording: Recording, *, frame: str | None = None, known: LearntCalibration | None = None
+    ) -> Orientation:
         """Estimate the orientation over a recording, each sample with the knowledge of all others.
 
         Parameters
@@ -195,6 +265,8 @@ class CalibratingEKF(CalibrationParameters):
             As for `run`.
         frame : {"NED", "ENU", "NWU"}, optional
             Navigation frame of the result; the recording's own when not given.
+        known : LearntCalibration, optional
+            What was learnt of these sensors before; see `warm_stream`.
 
         Returns
         -------
@@ -206,12 +278,64 @@ class CalibratingEKF(CalibrationParameters):
         InputError
             As for `run`.
         """
+        return self._smoothed(self._begun(recording, frame, known), recording)
+
+    def learn(
+        self,
+        recording: Recording,
+        *,
+        frame: str | None = None,
+        known: LearntCalibration | None = None,
+        offline: bool = False,
+        max_gap: float = 0.1,
+    ) -> tuple[Orientation, LearntCalibration]:
+        """Estimate the orientation over a recording, and give what has been learnt of the sensors by its end.
+
+        Parameters
+        ----------
+        recording, frame, known, max_gap
+            As for `run`; `max_gap` has no effect offline.
+        offline : bool
+            Smooth instead of running.
+
+        Returns
+        -------
+        tuple of Orientation and LearntCalibration
+            The estimate of `run` or `smooth`. What was learnt is the same for both but for rest, which a smoother
+            sees better: at the end of a recording, past and future are all past.
+
+        Raises
+        ------
+        InputError
+            As for `run`.
+        """
+        stream = self._begun(recording, frame, known, max_gap=max_gap)
+        estimate = self._smoothed(stream, recording) if offline else stream.run(recording)
+        return estimate, learnt(stream)
+
+    def _begun(
+        self,
+        recording: Recording,
+        frame: str | None,
+        known: LearntCalibration | None,
+        initial: Rotation | None = None,
+        max_gap: float = 0.1,
+    ) -> Stream:
+        """A stream for a recording, which has not taken it yet."""
+        self.check_sensors(recording)
+        this = self.for_recording(recording)
+        frame = frame or recording.frame
+        if known is None:
+            return this.stream(frame=frame, initial=initial, max_gap=max_gap)
+        return this.warm_stream(known, frame=frame, initial=initial, max_gap=max_gap)
+
+    def _smoothed(self, stream: Stream, recording: Recording) -> Orientation:
         from northdown.estimators import _calibrating_smoother as smoother
 
-        stream = self.stream(frame=frame or recording.frame)
+        whole = restored(recording, stream._work.state[N_RUNNER + LEVELS :])
         flags, out = smoother.smooth(
             stream,
-            recording,
+            whole,
             self.rest_window,
             self.rest_gyr,
             self.rest_acc,

@@ -46,6 +46,8 @@ TILT_UNKNOWN: Final = 1
 HEADING_UNKNOWN: Final = 2
 GYRO_HELD: Final = 4
 LONG_STEP: Final = 8
+# The one flag of a filter that says nothing while heading is unknown.
+_MAG_REJECTED: Final = 16
 
 # Return codes; a run returns the number of samples done and one of these.
 OK: Final = 0
@@ -189,7 +191,8 @@ def make_tick(kernel: Kernel) -> Callable[..., Any]:
                 s = aligned(p, s, q, pending == 0.0)
                 if memoryless:
                     s = step(p, s, 0.0, gyr, acc, mag, extra)
-            flags |= int(pending) if pending > 0.0 else flagged(p, s)
+            said = flagged(p, s)
+            flags |= int(pending) | (said & ~_MAG_REJECTED) if pending > 0.0 else said
         return OK, flags, s, (pending, gyr[0], gyr[1], gyr[2], gap, max_gap)
 
     return tick
