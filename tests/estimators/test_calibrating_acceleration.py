@@ -109,3 +109,14 @@ def test_nothing_changes_on_real_recordings(data_root):
         recording = nd.datasets.broad(trial, data_root)
         for method in ("run", "smooth"):
             assert not getattr(nd.CalibratingEKF(), method)(recording).has(Flag.ACC_REJECTED).any()
+
+
+def test_fast_motion_is_neither_travel_nor_a_lost_attitude(data_root):
+    """Even where the filter is told that motion on the spot hardly moves its velocity: 112° and 101° if either were."""
+    for trial in ("15_undisturbed_fast_translation_A", "21_undisturbed_fast_combined"):
+        if not (data_root / "broad" / f"{trial}.mat").is_file():
+            pytest.skip(f"{trial} is not at hand")
+        recording = nd.datasets.broad(trial, data_root)
+        estimate = nd.CalibratingEKF(speed_motion=0.0, acc_motion=0.0).run(recording)
+        assert not estimate.has(Flag.ACC_REJECTED).any()
+        assert nd.attitude_error(estimate, recording).rmse().total_deg < 2.0

@@ -72,7 +72,8 @@ SHARE: Final = 0.5
 FAR_LESS: Final = 0.1
 """Part below which it must be tilt."""
 LOST_TILT: Final = 0.15
-"""Tilt (rad) that horizontal force must show for the attitude to be wrong, and not the accelerometer."""
+"""Tilt (rad) that horizontal force must show for the attitude to be wrong, and not the accelerometer. Motion to and fro
+may have a part in it, too: twice what it may raise the norm by counts beside."""
 LOST_WITHIN: Final = 10.0
 """Time (s) in which a wrong bias would have brought about a wrong attitude."""
 CALM: Final = 0.3
@@ -121,7 +122,7 @@ def watch_acceleration(p: Any, s: Any, time: float, variance: float, still: bool
     lively = LIVELY * math.sqrt(s[FORCE_CHANGE])
     across = s[LOW_FORCE] * s[LOW_FORCE] + s[LOW_FORCE + 1] * s[LOW_FORCE + 1]
     excess = math.sqrt(s[NORM] * s[NORM] + across) - s[NORM]
-    tilted = across > (LOST_TILT * s[NORM]) ** 2 and learnt > LEARNT
+    tilted = across > (LOST_TILT * s[NORM] + 2.0 * lively) ** 2 and learnt > LEARNT
     if tilted and excess > p.acc_gate + lively and more < FAR_LESS * excess:
         _lose(s, across)
         return
