@@ -112,7 +112,7 @@ def test_nothing_changes_on_real_recordings(data_root):
 
 
 def test_fast_motion_is_neither_travel_nor_a_lost_attitude(data_root):
-    """Even where the filter is told that motion on the spot hardly moves its velocity: 112° and 101° if either were."""
+    """Even where the filter is told that motion on the spot moves its velocity little: else 112° and 101° off."""
     for trial in ("15_undisturbed_fast_translation_A", "21_undisturbed_fast_combined"):
         if not (data_root / "broad" / f"{trial}.mat").is_file():
             pytest.skip(f"{trial} is not at hand")

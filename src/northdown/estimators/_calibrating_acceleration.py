@@ -72,8 +72,8 @@ SHARE: Final = 0.5
 FAR_LESS: Final = 0.1
 """Part below which it must be tilt."""
 LOST_TILT: Final = 0.15
-"""Tilt (rad) that horizontal force must show for the attitude to be wrong, and not the accelerometer. Motion to and fro
-may have a part in it, too: twice what it may raise the norm by counts beside."""
+"""Tilt (rad) that horizontal force must show for the attitude to be wrong, and not the accelerometer; beside twice
+what motion to and fro may raise the norm by."""
 LOST_WITHIN: Final = 10.0
 """Time (s) in which a wrong bias would have brought about a wrong attitude."""
 CALM: Final = 0.3
