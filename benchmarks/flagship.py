@@ -319,7 +319,12 @@ def step(name: str, value: float, direction: int) -> float:
 
 
 def cross(
-    trials: list[Trial], seconds: float, names: tuple[str, ...], relative: bool = False, greedy: bool = False
+    trials: list[Trial],
+    seconds: float,
+    names: tuple[str, ...],
+    relative: bool = False,
+    greedy: bool = False,
+    both: bool = False,
 ) -> dict[str, object]:
     """Leave one trial of BROAD out, choose on the others, report on the one left out."""
     known: dict[tuple[float, ...], np.ndarray] = {}
@@ -335,17 +340,27 @@ def cross(
     def costs(point: dict[str, float]) -> np.ndarray:
         return (np.log(errors(point)) if relative else errors(point)).sum(axis=1)
 
-    def gain(now: np.ndarray, then: np.ndarray, out: int) -> float:
-        """By how much the cost falls; 0 where that is too little, or not sure enough."""
+    def weights(out: int) -> np.ndarray:
         weight = np.where(guard, GUARD / max(guard.sum(), 1), 1.0)
         weight[~guard] /= (~guard).sum() - (out >= 0)
         weight[[out] if out >= 0 else []] = 0.0
+        return weight
+
+    def gain(now: np.ndarray, then: np.ndarray, out: int) -> float:
+        """By how much the cost falls; 0 where that is too little, or not sure enough."""
+        weight = weights(out)
         falls = now - then
         total = float(weight @ falls)
         doubt = float(np.linalg.norm(weight * (falls - total / weight.sum())))
         return total if total > max(LEAST_GAIN, 0.0 if greedy else doubt) else 0.0
 
-    def descend(out: int) -> tuple[dict[str, float], bool]:
+    def choose(out: int) -> tuple[dict[str, float], bool]:
+        """What the search ends at; of the ends of both orders, the one of less cost."""
+        ends = [descend(out, order) for order in ((names, names[::-1]) if both else (names,))]
+        best = min(ends, key=lambda end: float(weights(out) @ costs(end[0])))
+        return best[0], all(done for _, done in ends)
+
+    def descend(out: int, names: tuple[str, ...]) -> tuple[dict[str, float], bool]:
         point, now, directions = dict(START), costs(START), dict.fromkeys(names, 1)
         while True:
             gained = 0.0
@@ -363,10 +378,10 @@ def cross(
                 return point, True
 
     rows, held = {}, []
-    everything, done = descend(-1)
+    everything, done = choose(-1)
     console.print(f"chosen on all trials: { {n: everything[n] for n in names} }; {len(known)} sets tried")
     for k in np.flatnonzero(~guard):
-        point, finished = descend(int(k))
+        point, finished = choose(int(k))
         done &= finished
         held.append(errors(point)[k])
         changed = ", ".join(f"{n} {v:g}" for n, v in point.items() if v != everything[n])
@@ -425,6 +440,7 @@ def main() -> int:
         "coverage": coverage,
         "iron": iron,
         "cross": lambda trials: cross(trials, options.seconds, tuple(START), relative=True),
+        "cross-both": lambda trials: cross(trials, options.seconds, tuple(START), relative=True, both=True),
         "cross-degrees": lambda trials: cross(trials, options.seconds, tuple(START)),
         "cross-few": lambda trials: cross(trials, options.seconds, FEW, greedy=True),
         "cross-greedy": lambda trials: cross(trials, options.seconds, tuple(START), greedy=True),
