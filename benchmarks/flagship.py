@@ -7,9 +7,9 @@ One set of parameters for everything. `cross` chooses the parameters anew for ea
 same start and on the other trials only, by coordinate steps on a grid of 1, 2, 5, 10, …; what is reported is the
 error on the trial that was left out. RepoIMU takes part in the choice as a guard. A step is taken when the logarithm
 of the errors falls, on average, by more than the standard error of that average over the trials: no step for the sake
-of one or two trials. `cross-both` goes through the parameters in either order and takes the better end; `cross-degrees`
-is `cross` with errors in degrees; `cross-greedy` takes every step that lowers their mean, and so does `cross-few`, with
-five parameters only. See README.md in this folder.
+of one or two trials. `cross-both` goes through the parameters in either order and takes the better end;
+`cross-degrees` is `cross` with errors in degrees; `cross-greedy` takes every step that lowers their mean, and so does
+`cross-few`, with five parameters only. See README.md in this folder.
 """
 
 from __future__ import annotations
