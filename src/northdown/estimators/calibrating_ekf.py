@@ -72,8 +72,8 @@ what it misses by.
 Acceleration that lasts
 -----------------------
 Where the velocity's innovation and the norm of specific force show that the body travels, the filter coasts on its
-gyroscope; see `_calibrating_acceleration`. Such samples are flagged `ACC_REJECTED`. Where force shows a tilt that its norm
-does not, the attitude is wrong instead, and its covariance is widened by that tilt.
+gyroscope; see `_calibrating_acceleration`. Such samples are flagged `ACC_REJECTED`. Where force shows a tilt that its
+norm does not, the attitude is wrong instead, and its covariance is widened by that tilt.
 
 Clipping
 --------
