@@ -1,4 +1,10 @@
-"""Choice of parameters by steepest descent on a grid, with no step that one or two trials bring about."""
+"""Choice of parameters by the cross-entropy method: the middle of the best of many random points.
+
+A search that goes step by step ends where its first steps lead it. Here points are drawn around a start, log-normally;
+the mean and the scatter of the best ones (of the logarithms of their parameters) are where the next are drawn; the
+mean of the best of these is the choice. Nothing depends on the order of the parameters, and none is decided by one
+point or one trial. Source: R. Y. Rubinstein, D. P. Kroese, "The Cross-Entropy Method", Springer 2004, section 5.
+"""
 
 from __future__ import annotations
 
@@ -6,46 +12,52 @@ from collections.abc import Callable
 
 import numpy as np
 
-LEAST_GAIN = 1e-3
-"""Least gain for which a step is taken, as a part of the error."""
+SCATTER = np.log(2.5)
+"""Standard deviation of the first points' parameters about the start: a factor of 2.5 either way."""
+FIRST, SECOND = 1500, 300
+"""Points of the two rounds."""
+BEST_FIRST, BEST_SECOND = 0.05, 0.1
+"""Parts of them that count."""
 
 Point = dict[str, float]
 
 
-def step(name: str, value: float, direction: int) -> float:
-    """Neighbour of a value on the grid 1, 2, 5, 10, …; of the exponent among whole numbers."""
-    if name == "gate_power":
-        return max(1.0, value + direction)
-    grid = [m * 10.0**e for e in range(-7, 5) for m in (1.0, 2.0, 5.0)]
-    return grid[int(np.argmin(np.abs(np.log(np.array(grid) / value)))) + direction]
+def draw(centre: np.ndarray, scatter: np.ndarray, n: int, allowed: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """Points (n, k) around a centre, all logarithms; those that are not allowed are drawn again. Same seed always."""
+    rng = np.random.default_rng(1)
+    found: list[np.ndarray] = []
+    while len(found) < n:
+        point = centre + scatter * rng.standard_normal(len(centre))
+        if allowed(point):
+            found.append(point)
+    return np.array(found)
 
 
-def neighbours(point: Point, allowed: Callable[[Point], bool]) -> list[Point]:
-    """Every point one step away in one parameter."""
-    found = [point | {name: step(name, point[name], direction)} for name in point for direction in (-1, 1)]
-    return [other for other in found if other != point and allowed(other)]
+def best(points: np.ndarray, cost: np.ndarray, part: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and scatter of the part of the points that cost least."""
+    chosen = points[np.argsort(cost, kind="stable")[: max(2, round(part * len(points)))]]
+    return chosen.mean(axis=0), chosen.std(axis=0)
 
 
-def gain(now: np.ndarray, then: np.ndarray, weight: np.ndarray) -> float:
-    """By how much the weighed sum of the trials' costs falls; 0 where that is too little, or not sure enough.
+class Search:
+    """Choices by the same first points for all weights of the trials.
 
-    Sure enough is more than the standard error of the sum over the trials.
+    `costs` gives those of all trials at a point; `allowed` whether the filter takes it.
     """
-    falls = now - then
-    total = float(weight @ falls)
-    doubt = float(np.linalg.norm(weight * (falls - total / weight.sum())))
-    return total if total > max(LEAST_GAIN, doubt) else 0.0
 
+    def __init__(self, start: Point, costs: Callable[[Point], np.ndarray], allowed: Callable[[Point], bool]) -> None:
+        self._names = tuple(start)
+        self._costs = costs
+        self._allowed = lambda logs: allowed(self.point(logs))
+        centre = np.log(list(start.values()))
+        self._points = draw(centre, np.full(len(centre), SCATTER), FIRST, self._allowed)
+        self._first = np.array([costs(self.point(p)) for p in self._points])
 
-def descend(
-    start: Point, costs: Callable[[Point], np.ndarray], weight: np.ndarray, allowed: Callable[[Point], bool]
-) -> Point:
-    """End of the way from `start` on which each step is, of all that are sure enough, the one that gains most."""
-    point, now = dict(start), costs(start)
-    while True:
-        others = neighbours(point, allowed)
-        gains = [gain(now, costs(other), weight) for other in others]
-        best = int(np.argmax(gains))
-        if gains[best] == 0.0:
-            return point
-        point, now = others[best], costs(others[best])
+    def point(self, logs: np.ndarray) -> Point:
+        return dict(zip(self._names, np.exp(logs).tolist(), strict=True))
+
+    def choose(self, weight: np.ndarray) -> Point:
+        """What the weighed sum of the trials' costs leads to."""
+        points = draw(*best(self._points, self._first @ weight, BEST_FIRST), SECOND, self._allowed)
+        cost = np.array([self._costs(self.point(p)) @ weight for p in points])
+        return self.point(best(points, cost, BEST_SECOND)[0])
