@@ -1,6 +1,6 @@
 """Choice of parameters by the cross-entropy method: the middle of the best of many random points.
 
-A search that goes step by step ends where its first steps lead it. Here points are drawn around a start, log-normally;
+A search that goes step by step ends where its first steps lead it. Here points are drawn around a start, log-normal;
 the mean and the scatter of the best ones (of the logarithms of their parameters) are where the next are drawn; the
 mean of the best of these is the choice. Nothing depends on the order of the parameters, and none is decided by one
 point or one trial. Source: R. Y. Rubinstein, D. P. Kroese, "The Cross-Entropy Method", Springer 2004, section 5.

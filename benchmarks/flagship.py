@@ -4,8 +4,8 @@
 
 One set of parameters for everything. `cross` chooses the parameters anew for each trial that is left out, from the
 same start and on the other trials only, by the cross-entropy method (see `_search.py`); what is reported is the error
-on the trial that was left out. The cost is the mean logarithm of the errors, real time and smoothed; RepoIMU takes part
-as a guard. It takes an hour and a half. See README.md in this folder.
+on the trial that was left out. The cost is the mean logarithm of the errors, real time and smoothed; RepoIMU takes
+part as a guard. It takes an hour and a half. See README.md in this folder.
 """
 
 from __future__ import annotations
