@@ -312,6 +312,8 @@ def test_a_wrong_bias_does_not_spin_a_body_at_rest():
         rest_offset_sigma=zero + 1e-4,
         mag_delay=0.0,
         mag_delay_sigma=0.01,
+        mag_iron=zero,
+        mag_iron_sigma=zero + 2.0,
     )
     n, rng = 6000, np.random.default_rng(4)
     recording = nd.Recording(

@@ -34,6 +34,8 @@ def summarise(
     roll, pitch, yaw = orientation.as_euler(degrees=True)[-1]
     rows.append(("At the end", f"roll {roll:.2f}°, pitch {pitch:.2f}°, yaw {yaw:.2f}° (body to {orientation.frame})"))
     rows += _certainty(orientation)
+    if "mag_iron" in orientation.diagnostics and (iron := orientation.diagnostics["mag_iron"][-1]) > 0.0:
+        rows.append(("Magnetometer", f"hard iron of {iron:.1f} µT taken out"))
     if recording.reference is not None:
         rows += _error(recording, orientation)
     flagged = ", ".join(f"{name}: {count}" for name, count in flag_counts(orientation).items())

@@ -15,6 +15,7 @@ from northdown.estimators._calibrating_acceleration import (
     watch_acceleration,
 )
 from northdown.estimators._calibrating_field import judge_field
+from northdown.estimators._calibrating_hard_iron import correct_iron, keep_iron, turn_sums
 from northdown.estimators._calibrating_iron import forget_iron, look_for_iron
 from northdown.estimators._calibrating_layout import (
     ACC_SQUARE,
@@ -260,6 +261,7 @@ def _weigh_heading(p: Any, s: Any) -> None:
     u = judge_field(p, s, math.sqrt(square), z, age)
     if s[FIELD + 2] != learnt:  # another field has become the reference
         forget_iron(s)
+        keep_iron(s)
     # A disturbed field has the norm and the dip of the reference now and then, by chance.
     u = max(u, s[MEAN_DEPARTURE])
     s[DEPARTURE] = u
@@ -269,6 +271,8 @@ def _weigh_heading(p: Any, s: Any) -> None:
     lag = (y * s[FIELD_SLOPE] - x * s[FIELD_SLOPE + 1]) * k / square
     s[HEADING_SLOPE], s[HEADING_SLOPE + 1], s[HEADING_SLOPE + 2] = hx, hy, lag
     doubt = (1.0 + u) ** p.gate_power
+    if correct_iron(p, s, (x, y, z), age, u):
+        return
     look_for_iron(s, (x, y, z), age / doubt)
     take_heading(s, p.mag / age * doubt, math.atan2(y, x))
 
@@ -286,6 +290,7 @@ def _correct(s: Any) -> None:
         s[GYR_BIAS + a] += s[ERROR + BIAS + a]
         s[SPEED + a] += s[ERROR + VELOCITY + a]
         s[REST_OFFSET + a] += s[ERROR + OFFSET + a]
+    turn_sums(s, d[2])
     # the error of heading turns the velocity with it
     c, n, x = math.cos(d[2]), math.sin(d[2]), s[SPEED]
     s[SPEED] = c * x - n * s[SPEED + 1]

@@ -38,7 +38,13 @@ FORMAT: Final = "northdown learnt calibration"
 VERSION: Final = 1
 SUFFIXES: Final = (".toml", ".json")
 _MAX_BYTES: Final = 1 << 16
-_UNITS: Final = {"gyr_bias": "rad/s", "gyr_matrix": "1", "rest_offset": "rad/s", "mag_delay": "s"}
+_UNITS: Final = {
+    "gyr_bias": "rad/s",
+    "gyr_matrix": "1",
+    "rest_offset": "rad/s",
+    "mag_delay": "s",
+    "mag_iron": "µT",
+}
 _HEAD: Final[Table] = {"format": FORMAT, "version": VERSION, "estimator": "calibrating-ekf", "frame": "body"}
 
 

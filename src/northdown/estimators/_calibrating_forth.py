@@ -11,6 +11,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from northdown.estimators._calibrating_hard_iron import iron_size
 from northdown.estimators._calibrating_layout import (
     CLOSED,
     COUNT_MAG,
@@ -56,7 +57,7 @@ Array = npt.NDArray[np.float64]
 RATE_N: Final = 7
 """Where the rate in navigation axes stands in the output on the way forth; on the way back the covariance does."""
 DIAGNOSTICS: Final = 19
-"""Where departure of the field, delay, stillness and acceleration stand in the output."""
+"""Where departure of the field, delay, stillness, acceleration and iron stand in the output."""
 
 # What is kept of an epoch.
 END: Final = 0  # index of its last sample
@@ -151,6 +152,7 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
             out[i, DIAGNOSTICS + 1] = s[MAG_DELAY]
             out[i, DIAGNOSTICS + 2] = s[STILL]
             out[i, DIAGNOSTICS + 3] = math.sqrt(s[MOTION])
+            out[i, DIAGNOSTICS + 4] = iron_size(s)
             rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
             for j in range(3):
                 out[i, RATE_N + j] = rate_n[j]

@@ -14,8 +14,8 @@ with e the horizontal direction across the field and m̄_h the field's horizonta
 on average. d is the part of its variance that is still open: 1 while the body has not turned, 0 once all is known.
 ε = (0.1 s) / time expects iron of about 5 % of the field, among disturbances of 1.6 % that last for a second.
 
-The filter does not correct for h: a field that varies from place to place looks much the same, and correcting for it
-made headings worse. But a large ψ tells that one of both is there.
+The filter does not correct for a small h: a field that varies from place to place looks much the same, and correcting
+for it made headings worse. But a large ψ tells that one of both is there. Of a large h, see `_calibrating_hard_iron`.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from northdown.estimators._calibrating_layout import IRON, IRON_KNOWN, IRON_TURN, Terms
+from northdown.estimators._calibrating_layout import IRON, IRON_HEADING, IRON_KNOWN, IRON_TURN, Terms
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import dot, rotate_inverse
 from northdown.kernels.turn import columns
 
-# The sums, from IRON on: weight, Σ R by columns, Σ m, Σ Rᵀ m.
-_TURN: Final = IRON + 1
-_FIELD: Final = IRON + 10
-_BODY_FIELD: Final = IRON + 13
+# The sums: weight, Σ R by columns, Σ m, Σ Rᵀ m.
+_TURN: Final = 1
+_FIELD: Final = 10
+_BODY_FIELD: Final = 13
 N_SUMS: Final = 16
 
 EXPECTED: Final = 0.1
@@ -44,10 +44,10 @@ LEAST_DOUBT: Final = 0.04
 
 @inline
 def heading_doubt(t: Terms, s: Any) -> float:
-    """Variance of heading that iron may cause, rad²."""
+    """Variance of heading that iron may cause, found or not, rad²."""
     seen = s[IRON_TURN] / SEEN
     variance: float = t.heading_floor * (max(LEAST_DOUBT, 1.0 - s[IRON_KNOWN]) + seen * seen)
-    return variance
+    return variance + float(s[IRON_HEADING])
 
 
 @inline
@@ -59,49 +59,75 @@ def forget_iron(s: Any) -> None:
 
 
 @inline
-def look_for_iron(s: Any, field: Any, weight: float) -> None:
-    """Take an epoch's mean field (navigation axes) into the sums, and find ψ and 1 − d."""
+def add_to_sums(s: Any, at: int, weight: float, field: Any) -> None:
+    """Take an epoch's mean field (navigation axes) into the sums that begin at `at`."""
     q = (s[0], s[1], s[2], s[3])
     c = columns(q)
     body = rotate_inverse(q, field)
-    s[IRON] += weight
+    s[at] += weight
     for i in range(3):
         for j in range(3):
-            s[_TURN + 3 * i + j] += weight * c[i][j]
-        s[_FIELD + i] += weight * field[i]
-        s[_BODY_FIELD + i] += weight * body[i]
-    k = 1.0 / s[IRON]
-    x, y = s[_FIELD] * k, s[_FIELD + 1] * k
-    square = x * x + y * y
-    if not square > 0.0:
-        return
-    h = math.sqrt(square)
-    m = (x, y, s[_FIELD + 2] * k)
-    a = (s[_TURN] * k, s[_TURN + 1] * k, s[_TURN + 2] * k)
-    b = (s[_TURN + 3] * k, s[_TURN + 4] * k, s[_TURN + 5] * k)
-    d = (s[_TURN + 6] * k, s[_TURN + 7] * k, s[_TURN + 8] * k)
-    across = ((x * a[1] - y * a[0]) / h, (x * b[1] - y * b[0]) / h, (x * d[1] - y * d[0]) / h)
-    e = EXPECTED * k
-    v = _solve(
-        1.0 + e - dot(a, a), -dot(a, b), -dot(a, d), 1.0 + e - dot(b, b), -dot(b, d), 1.0 + e - dot(d, d), across
-    )
-    pull = (
-        s[_BODY_FIELD] * k - dot(a, m),
-        s[_BODY_FIELD + 1] * k - dot(b, m),
-        s[_BODY_FIELD + 2] * k - dot(d, m),
-    )
-    s[IRON_TURN] = dot(v, pull) / h
-    s[IRON_KNOWN] = 1.0 - e * dot(v, across)
+            s[at + _TURN + 3 * i + j] += weight * c[i][j]
+        s[at + _FIELD + i] += weight * field[i]
+        s[at + _BODY_FIELD + i] += weight * body[i]
 
 
 @inline
-def _solve(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, v: Any) -> Any:
-    """Solution of a symmetric positive definite system of three equations, by its adjugate."""
+def fit(s: Any, at: int, expected: float, centre: Any) -> Any:
+    """Whether there is a fit; h, its pull, the mean field m̄, the inverse in h, ψ and d, by the sums at `at`.
+
+    `expected` is the weight (s) of the expectation that the iron is `centre`.
+    """
+    zero = (0.0, 0.0, 0.0)
+    if not s[at] > 0.0:
+        return False, zero, zero, zero, zero + zero, 0.0, 1.0
+    k = 1.0 / s[at]
+    m = (s[at + _FIELD] * k, s[at + _FIELD + 1] * k, s[at + _FIELD + 2] * k)
+    x, y = m[0], m[1]
+    square = x * x + y * y
+    if not square > 0.0:
+        return False, zero, zero, zero, zero + zero, 0.0, 1.0
+    level = math.sqrt(square)
+    r = at + _TURN
+    a = (s[r] * k, s[r + 1] * k, s[r + 2] * k)
+    b = (s[r + 3] * k, s[r + 4] * k, s[r + 5] * k)
+    c = (s[r + 6] * k, s[r + 7] * k, s[r + 8] * k)
+    across = ((x * a[1] - y * a[0]) / level, (x * b[1] - y * b[0]) / level, (x * c[1] - y * c[0]) / level)
+    e = expected * k
+    inverse = _inverse(
+        1.0 + e - dot(a, a), -dot(a, b), -dot(a, c), 1.0 + e - dot(b, b), -dot(b, c), 1.0 + e - dot(c, c)
+    )
+    r = at + _BODY_FIELD
+    pull = (s[r] * k - dot(a, m), s[r + 1] * k - dot(b, m), s[r + 2] * k - dot(c, m))
+    with_centre = (pull[0] + e * centre[0], pull[1] + e * centre[1], pull[2] + e * centre[2])
+    h = _product(inverse, with_centre)
+    return True, h, pull, m, inverse, dot(across, h) / level, e * dot(across, _product(inverse, across))
+
+
+@inline
+def look_for_iron(s: Any, field: Any, weight: float) -> None:
+    """Take an epoch's mean field (navigation axes) into the sums, and find ψ and 1 − d."""
+    add_to_sums(s, IRON, weight, field)
+    known, _, _, _, _, turn, still_open = fit(s, IRON, EXPECTED, (0.0, 0.0, 0.0))
+    if known:
+        s[IRON_TURN] = turn
+        s[IRON_KNOWN] = 1.0 - still_open
+
+
+@inline
+def _inverse(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> Any:
+    """Upper triangle of the inverse of a symmetric positive definite 3 × 3 matrix, by its adjugate."""
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
     k = 1.0 / (xx * a + xy * b + xz * c)
+    return k * a, k * b, k * c, k * d, k * e, k * f
+
+
+@inline
+def _product(m: Any, v: Any) -> Any:
+    """Of a symmetric matrix, given by its upper triangle, and a vector."""
     return (
-        k * (a * v[0] + b * v[1] + c * v[2]),
-        k * (b * v[0] + d * v[1] + e * v[2]),
-        k * (c * v[0] + e * v[1] + f * v[2]),
+        m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+        m[1] * v[0] + m[3] * v[1] + m[4] * v[2],
+        m[2] * v[0] + m[4] * v[1] + m[5] * v[2],
     )

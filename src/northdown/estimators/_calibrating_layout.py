@@ -98,8 +98,18 @@ IRON: Final = MISSED + 1
 IRON_TURN: Final = IRON + 16  # heading by which it would turn the field on average
 IRON_KNOWN: Final = IRON_TURN + 1  # part of the variance of that heading that is no longer open
 
+# Hard iron that is so large that it is taken out.
+MAG_IRON: Final = IRON_KNOWN + 1  # the iron, body axes
+IRON_STATE: Final = MAG_IRON + 3  # 0 none found, 1 found, -1 as given
+IRON_CENTRE: Final = IRON_STATE + 1  # the iron expected
+IRON_VARIANCE: Final = IRON_CENTRE + 3  # its variance; infinite where only its usual size is known
+IRON_HEADING: Final = IRON_VARIANCE + 1  # variance of heading from what the iron found may be wrong by
+IRON_WRONG: Final = IRON_HEADING + 1  # for how long the field has not been as it should be without it
+FIELD_SUMS: Final = IRON_WRONG + 1  # sums as those above, of the field with the iron in it
+FIELD_SQUARE: Final = FIELD_SUMS + 16
+
 # Seven scalar measurements of an epoch: velocity, heading, rest. Of each 1/S (0: not taken) and y/S.
-TAKEN: Final = IRON_KNOWN + 1
+TAKEN: Final = FIELD_SQUARE + 1
 HEADING_SLOPE: Final = TAKEN + 14  # derivatives of the heading with respect to tilt x, tilt y and delay
 RAW: Final = HEADING_SLOPE + 3  # of each the variance of its noise, and what it misses the nominal values by
 WIDENED: Final = RAW + 14  # whether the bias was given the variance of its miss before they were taken
@@ -130,6 +140,7 @@ class Terms(NamedTuple):
     gate_window: float
     field_window: float
     field_new: float
+    iron_share: float
     rest_gyr: float
     rest_acc: float
     rest_mean: float

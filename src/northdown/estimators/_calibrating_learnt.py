@@ -10,6 +10,7 @@ import numpy as np
 from northdown._validation import FloatArray, as_float_array, check_no_infinity, check_number
 from northdown.errors import InputError, expected
 from northdown.estimators import _calibrating_files as files
+from northdown.estimators._calibrating_hard_iron import begin_with_iron, iron_sigma
 from northdown.estimators._calibrating_layout import (
     BIAS,
     COV,
@@ -17,6 +18,7 @@ from northdown.estimators._calibrating_layout import (
     GYR_BIAS,
     GYR_MATRIX,
     MAG_DELAY,
+    MAG_IRON,
     MATRIX,
     OFFSET,
     REST_OFFSET,
@@ -26,12 +28,12 @@ from northdown.estimators._calibrating_result import DIAGONAL
 from northdown.estimators._stream import Stream
 from northdown.kernels.runner import N_RUNNER
 
-_SHAPES = {"gyr_bias": (3,), "gyr_matrix": (3, 3), "rest_offset": (3,)}
+_SHAPES = {"gyr_bias": (3,), "gyr_matrix": (3, 3), "rest_offset": (3,), "mag_iron": (3,)}
 
 
 @dataclass(frozen=True, eq=False)
 class LearntCalibration:
-    """Calibration of the gyroscope and delay of the magnetometer, with standard deviations.
+    """Calibration of the gyroscope, delay and hard iron of the magnetometer, with standard deviations.
 
     Parameters
     ----------
@@ -43,6 +45,9 @@ class LearntCalibration:
         What the bias at rest has more, rad/s.
     mag_delay, mag_delay_sigma : float
         Delay of the magnetometer behind the gyroscope, s.
+    mag_iron, mag_iron_sigma : (3,) arrays
+        Hard iron that is taken out of the magnetometer's samples, in their unit (µT). None is taken out of what a run
+        begins with if it is zero; with a sigma of zero it stays as it is.
 
     Raises
     ------
@@ -58,6 +63,8 @@ class LearntCalibration:
     rest_offset_sigma: FloatArray
     mag_delay: float
     mag_delay_sigma: float
+    mag_iron: FloatArray
+    mag_iron_sigma: FloatArray
 
     def __post_init__(self) -> None:
         for name, shape in _SHAPES.items():
@@ -116,6 +123,8 @@ def learnt(stream: Stream) -> LearntCalibration:
         rest_offset_sigma=sigma[OFFSET : OFFSET + 3],
         mag_delay=float(s[MAG_DELAY]),
         mag_delay_sigma=float(sigma[DELAY]),
+        mag_iron=s[MAG_IRON : MAG_IRON + 3],
+        mag_iron_sigma=iron_sigma(s),
     )
 
 
@@ -126,6 +135,7 @@ def begin_with(stream: Stream, known: LearntCalibration) -> None:
     s[GYR_MATRIX : GYR_MATRIX + 9] = known.gyr_matrix.T.ravel()
     s[REST_OFFSET : REST_OFFSET + 3] = known.rest_offset
     s[MAG_DELAY] = known.mag_delay
+    begin_with_iron(s, known.mag_iron, known.mag_iron_sigma)
     variance = {
         BIAS: known.gyr_bias_sigma,
         MATRIX: known.gyr_matrix_sigma.T.ravel(),

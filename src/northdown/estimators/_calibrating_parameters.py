@@ -56,6 +56,9 @@ class CalibrationParameters(Estimator):
     field_new : float
         Time (s), in motion, for which another field must have been steady to become the reference. Raising it holds
         to the old field for longer.
+    iron_share : float
+        Part of the variation of the field in navigation axes that hard iron on the body must explain to be taken out;
+        1 for never. Raising it needs surer evidence, and leaves larger iron in.
     rest_gyr : float
         Largest scatter of the gyroscope at rest, rad/s, root of the sum over the axes; 0 for no rest detection.
         Raising it takes more for rest.
@@ -131,6 +134,7 @@ class CalibrationParameters(Estimator):
     gate_window: float = parameter(0.5, unit="s", low=0.0)
     field_window: float = parameter(200.0, unit="s", above=0.0)
     field_new: float = parameter(60.0, unit="s", above=0.0)
+    iron_share: float = parameter(0.8, low=0.0, high=1.0)
     rest_gyr: float = parameter(0.005, unit="rad/s", low=0.0)
     rest_acc: float = parameter(0.15, unit="m/s²", low=0.0)
     rest_rate: float = parameter(0.035, unit="rad/s", low=0.0)
@@ -173,6 +177,7 @@ class CalibrationParameters(Estimator):
             gate_window=self.gate_window,
             field_window=self.field_window,
             field_new=self.field_new,
+            iron_share=self.iron_share,
             rest_gyr=self.rest_gyr**2,
             rest_acc=self.rest_acc**2,
             rest_mean=self.rest_rate,

@@ -6,6 +6,7 @@ import math
 from typing import Any, Final
 
 from northdown.estimators._calibrating_epoch import clear_sums
+from northdown.estimators._calibrating_hard_iron import iron_size, keep_iron
 from northdown.estimators._calibrating_iron import forget_iron, heading_doubt
 from northdown.estimators._calibrating_layout import (
     ATTITUDE,
@@ -15,6 +16,7 @@ from northdown.estimators._calibrating_layout import (
     DEPARTURE,
     HOLD,
     MAG_DELAY,
+    MAG_IRON,
     MOTION,
     RATE,
     STILL,
@@ -70,9 +72,12 @@ def aligned(p: Any, s: Any, q: Any, heading_known: bool) -> Any:
         s[COV + (VELOCITY + i) * DIAGONAL] = START_SPEED * START_SPEED
     s[COV] = t.start_tilt
     s[COV + DIAGONAL] = t.start_tilt
-    s[COV + 2 * DIAGONAL] = t.start_heading if heading_known else math.pi * math.pi / 3.0
+    # the heading was found with the iron in it
+    without = s[MAG_IRON] == 0.0 and s[MAG_IRON + 1] == 0.0 and s[MAG_IRON + 2] == 0.0
+    s[COV + 2 * DIAGONAL] = t.start_heading if heading_known and without else math.pi * math.pi / 3.0
     clear_sums(s)
     forget_iron(s)
+    keep_iron(s)
     return s
 
 
@@ -87,7 +92,7 @@ def ahead(t: Terms, q: Any, rate_n: Any) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, u, delay, stillness, acceleration."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, u, delay, stillness, acceleration, iron."""
     t = Terms(*p)
     row = COV + WIDTH
     p_upper = (s[COV], s[COV + 1], s[COV + 2], s[row + 1], s[row + 2], s[row + WIDTH + 2])
@@ -97,7 +102,7 @@ def output(p: Any, s: Any) -> Any:
     sigma = (math.sqrt(s[at]), math.sqrt(s[at + DIAGONAL]), math.sqrt(s[at + 2 * DIAGONAL]))
     q = ahead(t, (s[0], s[1], s[2], s[3]), rate_n)
     nominal = q + (s[4], s[5], s[6])
-    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL], math.sqrt(s[MOTION]))
+    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL], math.sqrt(s[MOTION]), iron_size(s))
 
 
 @inline

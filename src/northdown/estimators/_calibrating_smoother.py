@@ -25,11 +25,9 @@ from northdown.estimators._calibrating_forth import (
     RATE_N,
     forth,
 )
+from northdown.estimators._calibrating_hard_iron import FOUND, GIVEN_IRON
 from northdown.estimators._calibrating_iron import heading_doubt
-from northdown.estimators._calibrating_layout import (
-    COV,
-    Terms,
-)
+from northdown.estimators._calibrating_layout import COV, FIELD_SQUARE, IRON_STATE, MAG_IRON, Terms
 from northdown.estimators._calibrating_result import ahead, covariance_of
 from northdown.estimators._calibrating_weights import reweigh
 from northdown.estimators._stream import Stream, all_samples
@@ -42,6 +40,7 @@ from northdown.kernels.stillness import quiet_windows
 from northdown.kernels.tuples import to_fixed_tuple
 from northdown.recording import Recording
 
+KEPT_IRON: Final = slice(N_RUNNER + MAG_IRON, N_RUNNER + FIELD_SQUARE + 1)
 _FOUND_LATE: Final = 0.3
 """Standard deviation (rad) of the tilt that a late first sample of the accelerometer gives to the beginning."""
 
@@ -77,12 +76,19 @@ def smooth(
     span = (time.max() - time[0]) / work.params[Terms._fields.index("epoch")] if n else 0.0
     records = np.empty((min(n, int(1.5 * span) + 2), N_RECORD))
     state, start = work.state.copy(), np.empty(N_START)
-    for _ in range(2):
+    while True:
         code, done, kept = forth(kernel)(
             work.params, work.state, rest_rate, time, *sensors, rate, out, flags, records, start
         )
         if code:
             stream._raise(code, time[done], done)
+        if work.state[N_RUNNER + IRON_STATE] == FOUND:
+            # Once more, without the iron that was found by the end.
+            state[KEPT_IRON] = work.state[KEPT_IRON]
+            state[N_RUNNER + IRON_STATE] = GIVEN_IRON
+            work.state[:] = state
+            flags[:] = 0
+            continue
         if not start[LATE]:
             break
         # The attitude was found late: once more, with what is now known of the beginning.

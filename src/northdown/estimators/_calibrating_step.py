@@ -26,6 +26,7 @@ from northdown.estimators._calibrating_layout import (
     GYR_MATRIX,
     HEAD,
     MAG_DELAY,
+    MAG_IRON,
     MOTION,
     N_RING,
     RATE,
@@ -93,7 +94,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         s[AGE_ACC] = 0.0
         add_to_block(s, BLOCK, age, gyr, acc)
     if is_sample(mag):
-        _add_field(s, q, rate, mag)
+        _add_field(s, q, rate, (mag[0] - s[MAG_IRON], mag[1] - s[MAG_IRON + 1], mag[2] - s[MAG_IRON + 2]))
     if s[TIME] + 0.5 * dt >= p.epoch:
         close_epoch(p, s)
     return s

@@ -75,6 +75,11 @@ Where the velocity's innovation and the norm of specific force show that the bod
 gyroscope; see `_calibrating_acceleration`. Such samples are flagged `ACC_REJECTED`. Where force shows a tilt that its
 norm does not, the attitude is wrong instead, and its covariance is widened by that tilt.
 
+Hard iron
+---------
+Where iron on the body explains more than `iron_share` of the variation of the field, it is taken out of the
+magnetometer's samples; see `_calibrating_hard_iron`. Smaller iron widens the covariance (below).
+
 Clipping
 --------
 Where the gyroscope is at the end of its range (`gyr_range`, or found from the data for each side of each axis), what
@@ -132,6 +137,7 @@ from northdown.estimators._calibrating_layout import (
     COV,
     DELAY,
     GIVEN,
+    IRON_VARIANCE,
     LEVELS,
     MAG_DELAY,
     MATRIX,
@@ -163,8 +169,9 @@ class CalibratingEKF(CalibrationParameters):
     Notes
     -----
     `Orientation.diagnostics` has `field_departure` (u, or its mean, as the last heading was weighed; above 4.6 the
-    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s), `still` (1 at rest) and `acceleration`, the root of the
-    mean square of linear acceleration over `motion_window`, m/s². From `smooth` they are those of its first pass.
+    sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s), `still` (1 at rest), `acceleration`, the root of the
+    mean square of linear acceleration over `motion_window`, m/s², and `mag_iron`, the norm of the hard iron that has
+    been found and is taken out, in the magnetometer's unit. From `smooth` they are those of its first pass.
     """
 
     _levels: ClassVar[tuple[float, ...]] = (math.inf,) * 6
@@ -176,7 +183,7 @@ class CalibratingEKF(CalibrationParameters):
         step,
         n_params=len(Terms._fields),
         n_state=N_STATE,
-        n_out=23,
+        n_out=24,
         output=output,
         aligned=aligned,
         flagged=flagged,
@@ -191,6 +198,7 @@ class CalibratingEKF(CalibrationParameters):
         "mag_delay": slice(20, 21),
         "still": slice(21, 22),
         "acceleration": slice(22, 23),
+        "mag_iron": slice(23, 24),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:
@@ -211,6 +219,7 @@ class CalibratingEKF(CalibrationParameters):
         s[COV + np.arange(N) * DIAGONAL] = sigma2
         s[LEVELS : LEVELS + 6] = self._levels if self.gyr_range == 0.0 else self.gyr_range
         s[QUANTUM] = math.nan
+        s[IRON_VARIANCE] = math.inf
         s[ALERT] = alert(s)
         return tuple(s[4:])
 
