@@ -41,7 +41,7 @@ class Flag(enum.IntFlag):
     GYRO_HELD = 4
     """The gyroscope had no sample; its last one was used."""
     LONG_STEP = 8
-    """More time than the maximum gap has passed since the last sample."""
+    """More time than the maximum gap has passed since the last sample; if more than 1 s, the attitude begins anew."""
     MAG_REJECTED = 16
     """The field was found disturbed. Of a Kalman filter: the sample was given less than 1 % of its weight."""
     NEAR_SINGULAR = 32

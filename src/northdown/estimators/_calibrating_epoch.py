@@ -65,6 +65,7 @@ from northdown.estimators._calibrating_layout import (
     TIME,
     TIME_ACC,
     TURN,
+    UNSEEN,
     VELOCITY,
     WIDENED,
     WORK,
@@ -199,7 +200,7 @@ def propagate(p: Any, s: Any, time: float) -> None:
     for a in range(3):
         mirror_row(s, COV, N, ATTITUDE + a)
         mirror_row(s, COV, N, VELOCITY + a)
-    angle = p.gyr * time + p.scale * s[RATE_SQUARE] + s[LOST]
+    angle = p.gyr * time + p.scale * s[RATE_SQUARE] + s[LOST] + s[UNSEEN]
     for a in range(3):
         for b in range(3):
             s[COV + (ATTITUDE + a) * WIDTH + ATTITUDE + b] += s[CLIPPED + a] * s[CLIPPED + b]

@@ -54,6 +54,7 @@ _TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)  # a recor
 def smooth(
     stream: Stream,
     recording: Recording,
+    first: int,
     window: float,
     rest_gyr: float,
     rest_acc: float,
@@ -63,6 +64,7 @@ def smooth(
 ) -> tuple[npt.NDArray[np.uint8], Array]:
     """Flags and output, as the kernel records it, of a recording smoothed by the estimator of a new stream.
 
+    `first` is the number of its first sample, for what is said of bad ones.
     `window`, `rest_gyr`, `rest_acc` and `rest_rate` are the estimator's criteria of rest; the window lies around the
     sample here. `most` and `walk` are those of the second pass, see `_calibrating_again`.
     """
@@ -81,7 +83,7 @@ def smooth(
             work.params, work.state, rest_rate, time, *sensors, rate, out, flags, records, start
         )
         if code:
-            stream._raise(code, time[done], done)
+            stream._raise(code, time[done], first + done)
         if work.state[N_RUNNER + IRON_STATE] == FOUND:
             # Once more, without the iron that was found by the end.
             state[KEPT_IRON] = work.state[KEPT_IRON]

@@ -41,6 +41,7 @@ from northdown.estimators._calibrating_layout import (
     TIME_ACC,
     TURN,
     TURNED,
+    UNSEEN,
     Terms,
 )
 from northdown.kernels.direction_error import is_sample
@@ -52,6 +53,8 @@ from northdown.kernels.turn import columns
 
 LONGEST_FORCE: Final = 0.1
 """Longest time (s) for which one accelerometer sample is taken to stand."""
+LONGEST_STEP: Final = 0.15
+"""Time (s) between samples beyond which half of the turn may not have been seen."""
 RING_STEP: Final = 2e-3
 """Shortest time (s) between the attitudes that are kept for the magnetometer's delay."""
 
@@ -75,7 +78,10 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
         _add_turn(s, dt, c, gyr)
         if s[CLIPPING] > 0.0:
             add_lacking(s, dt, c)
-        s[RATE_SQUARE] += dot(rate, rate) * dt
+        square = dot(rate, rate)
+        s[RATE_SQUARE] += square * dt
+        if dt > LONGEST_STEP:
+            s[UNSEEN] += 0.25 * square * dt * dt
     s[AGE_ACC] += dt
     s[AGE_MAG] += dt
     if is_sample(acc):

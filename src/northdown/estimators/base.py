@@ -141,7 +141,9 @@ class Estimator(abc.ABC):
             accelerometer sample and heading from the first usable magnetometer sample; until then
             `Orientation.flags` says so.
         max_gap : float
-            Longest time (s) for which the last gyroscope sample is held while the gyroscope has none.
+            Longest time (s) for which the last gyroscope sample is held while the gyroscope has none. Where more time
+            than this, and than 1 s, has passed without any sample, tilt and heading are found anew as at the start
+            (but by `vqf`, which keeps to its paper).
 
         Returns
         -------

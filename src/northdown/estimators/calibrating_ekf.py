@@ -119,6 +119,7 @@ doi:10.1080/00207177308932487. The states for matrix, delay and rest, and the we
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -154,8 +155,8 @@ from northdown.estimators._calibrating_result import DIAGONAL, START_SPEED, alig
 from northdown.estimators._calibrating_step import step
 from northdown.estimators._stream import Stream, outputs
 from northdown.frames import Frame
-from northdown.kernels.runner import N_RUNNER, Kernel
-from northdown.orientation import Orientation
+from northdown.kernels.runner import LONGEST_HOLE, MAX_GAP, N_RUNNER, Kernel
+from northdown.orientation import Flag, Orientation
 from northdown.recording import Recording
 
 if TYPE_CHECKING:
@@ -288,7 +289,7 @@ class CalibratingEKF(CalibrationParameters):
         InputError
             As for `run`.
         """
-        return self._smoothed(self._begun(recording, frame, known), recording)
+        return self._smoothed(self._begun(recording, frame, known), recording)[0]
 
     def learn(
         self,
@@ -320,7 +321,9 @@ class CalibratingEKF(CalibrationParameters):
             As for `run`.
         """
         stream = self._begun(recording, frame, known, max_gap=max_gap)
-        estimate = self._smoothed(stream, recording) if offline else stream.run(recording)
+        if not offline:
+            return stream.run(recording), learnt(stream)
+        estimate, stream = self._smoothed(stream, recording)
         return estimate, learnt(stream)
 
     def _begun(
@@ -339,21 +342,29 @@ class CalibratingEKF(CalibrationParameters):
             return this.stream(frame=frame, initial=initial, max_gap=max_gap)
         return this.warm_stream(known, frame=frame, initial=initial, max_gap=max_gap)
 
-    def _smoothed(self, stream: Stream, recording: Recording) -> Orientation:
+    def _smoothed(self, stream: Stream, recording: Recording) -> tuple[Orientation, Stream]:
+        """The estimate, and the stream at its end: another one if a long time without samples has been met."""
         from northdown.estimators import _calibrating_smoother as smoother
 
         whole = restored(recording, stream._work.state[N_RUNNER + LEVELS :])
-        flags, out = smoother.smooth(
-            stream,
-            whole,
-            self.rest_window,
-            self.rest_gyr,
-            self.rest_acc,
-            self.rest_rate,
-            self.heading_outlier,
-            self.smooth_walk,
-        )
-        return Orientation._trusted(
+        holes = np.flatnonzero(np.diff(recording.time) > max(LONGEST_HOLE, stream._work.state[MAX_GAP])) + 1
+        flags, out = np.empty(len(recording), np.uint8), np.empty((len(recording), self.kernel.n_out))
+        for first, end in itertools.pairwise((0, *holes.tolist(), len(recording))):
+            if first > 0:
+                stream = self.warm_stream(learnt(stream), frame=stream.frame)
+            flags[first:end], out[first:end] = smoother.smooth(
+                stream,
+                whole[first:end],
+                first,
+                self.rest_window,
+                self.rest_gyr,
+                self.rest_acc,
+                self.rest_rate,
+                self.heading_outlier,
+                self.smooth_walk,
+            )
+        flags[holes] |= int(Flag.LONG_STEP)
+        estimate = Orientation._trusted(
             time=recording.time,
             quat=out[:, :4],
             frame=stream.frame,
@@ -361,6 +372,7 @@ class CalibratingEKF(CalibrationParameters):
             name=self.name,
             **outputs(self.outputs, out),
         )
+        return estimate, stream
 
     def learnt(self, stream: Stream) -> LearntCalibration:
         """What a running estimate of this filter has learnt of its sensors.

@@ -6,7 +6,8 @@ NaN in acc or mag means that there is no sample. A filter that takes more number
 one more tuple at the end. :class:`Kernel` compiles the loop around it.
 
 What all filters share is done here, once: the start from the first usable accelerometer and magnetometer
-samples, holding the last rate through short gaps of the gyroscope, and turning the result to the frame asked for.
+samples, the same again after a long time without any, holding the last rate through short gaps of the gyroscope, and
+turning the result to the frame asked for.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ MAX_GAP: Final = 6  # longest time (s) for which a rate is held
 PERIOD: Final = 7  # time (s) from one live sample to the next where none is given; NaN when not known
 COUNT: Final = 8  # samples done
 N_RUNNER: Final = 9
+
+# Longest time (s) without samples over which an attitude is carried on; after a longer one it is found anew.
+LONGEST_HOLE: Final = 1.0
 
 # Stands for the time of a live sample that has none of its own: a number that no clock gives.
 NEXT: Final = -1.7e308
@@ -159,6 +163,7 @@ def make_tick(kernel: Kernel) -> Callable[..., Any]:
     def tick(p: Any, s: Any, r: Any, dt: float, gyr: Any, acc: Any, mag: Any, extra: Any) -> Any:
         pending, hx, hy, hz, gap, max_gap = r
         flags = 0
+        begins_anew = dt > LONGEST_HOLE and dt > max_gap and not memoryless
         if gyr[0] == gyr[0] and gyr[1] == gyr[1] and gyr[2] == gyr[2]:
             gap = 0.0
             if dt > max_gap:
@@ -169,6 +174,8 @@ def make_tick(kernel: Kernel) -> Callable[..., Any]:
             gyr = (hx, hy, hz)
             if gap > max_gap:
                 return GYRO_GAP, flags, s, (pending, hx, hy, hz, gap, max_gap)
+        if begins_anew:
+            pending, dt = float(TILT_UNKNOWN | HEADING_UNKNOWN), 0.0
         if pending == 0.0:
             s = step(p, s, dt, gyr, acc, mag, extra)
             flags |= flagged(p, s)
