@@ -1,10 +1,11 @@
 """How accurate the estimators are on public recordings with an optical reference, beside published figures and VQF.
 
     python benchmarks/accuracy.py [-e mahony,madgwick] [--data broad|repoimu] [--trials 1,3] [--root DIR]
-                                  [--no-peers] [--json FILE]
+                                  [--no-peers] [--flagship PARTS] [--json FILE]
 
 The recordings are not part of northdown: --root, or the environment variable NORTHDOWN_DATA, names the folder that
-has broad/ and repoimu/ in it. See README.md in this folder.
+has broad/ and repoimu/ in it. `--flagship all` goes on with all that flagship.py measures: coverage, ablation,
+cross-validation and time of `calibrating-ekf`. See README.md in this folder.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 import _peers
+import flagship
 import northdown as nd
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "tests" / "reference" / "broad_published.json"
@@ -157,6 +159,9 @@ def main() -> int:
     parser.add_argument("--trials", metavar="NUMBERS", help="BROAD trials or RepoIMU tests, comma-separated")
     parser.add_argument("--root", type=Path, default=os.environ.get("NORTHDOWN_DATA"), help="default: NORTHDOWN_DATA")
     parser.add_argument("--no-peers", action="store_true", help="northdown and published figures only")
+    parser.add_argument(
+        "--flagship", metavar="PARTS", help="also these parts of flagship.py, comma-separated, or all"
+    )
     parser.add_argument("--json", metavar="FILE", type=Path, help="also write the figures there")
     options = parser.parse_args()
     if options.root is None:
@@ -198,8 +203,15 @@ def main() -> int:
         console.print(
             f"{AS_PUBLISHED} differs from the published figures by at most {max(differences):.4f}° (bar 0.002°)"
         )
+    found: dict[str, object] = {"trials": results, "means": means}
+    if options.flagship:
+        try:
+            found["flagship"] = flagship.report(options.root, options.flagship)
+        except ValueError as problem:
+            console.print(f"accuracy: {problem}")
+            return 1
     if options.json:
-        options.json.write_text(json.dumps({"trials": results, "means": means}, indent=1), encoding="utf-8")
+        options.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
     return 0
 
 

@@ -377,30 +377,46 @@ def speed(trials: list[Trial]) -> dict[str, object]:
     return found
 
 
+PARTS = {
+    "accuracy": accuracy,
+    "ablation": ablation,
+    "coverage": coverage,
+    "iron": iron,
+    "time": speed,
+    "cross": cross,
+}
+
+
+def report(root: Path, names: str) -> dict[str, object]:
+    """Print the parts of these names, comma-separated, or all; what they found.
+
+    Raises
+    ------
+    ValueError
+        When a name is none of a part.
+    """
+    chosen = list(PARTS) if names == "all" else names.split(",")
+    if unknown := [name for name in chosen if name not in PARTS]:
+        raise ValueError(f"expected parts out of {', '.join(PARTS)}, got {', '.join(unknown)}")
+    trials = load(root)
+    return {name: PARTS[name](trials) for name in chosen}
+
+
 def main() -> int:
     """Run the parts asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, default=os.environ.get("NORTHDOWN_DATA"), help="default: NORTHDOWN_DATA")
-    parser.add_argument("--part", default="accuracy,ablation,coverage,iron,time,cross", metavar="NAMES")
+    parser.add_argument("--part", default="all", metavar="NAMES")
     parser.add_argument("--json", metavar="FILE", type=Path, help="also write the figures there")
     options = parser.parse_args()
     if options.root is None:
         console.print("flagship: skipped, as there are no recordings; set NORTHDOWN_DATA or give --root")
         return 0
-    parts = {
-        "accuracy": accuracy,
-        "ablation": ablation,
-        "coverage": coverage,
-        "iron": iron,
-        "cross": cross,
-        "time": speed,
-    }
-    chosen = options.part.split(",")
-    if unknown := [p for p in chosen if p not in parts]:
-        console.print(f"flagship: expected parts out of {', '.join(parts)}, got {', '.join(unknown)}")
+    try:
+        found = report(options.root, options.part)
+    except ValueError as problem:
+        console.print(f"flagship: {problem}")
         return 1
-    trials = load(options.root)
-    found = {part: parts[part](trials) for part in chosen}
     if options.json:
         options.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
     return 0
