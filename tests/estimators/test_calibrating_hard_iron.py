@@ -109,6 +109,21 @@ def test_iron_that_is_gone_is_forgotten():
     assert heading(estimate, changed, start=120.0)[0] < 2.0
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_smoother_knows_that_it_was_not_always_there(seed):
+    r = recording(seed, on_body=np.zeros(3), seconds=200.0)
+    for there in (r.time > 90.0, r.time < 110.0):
+        changed = dataclasses.replace(r, mag=r.mag + there[:, None] * IRON)
+        smoothed = nd.CalibratingEKF().smooth(changed)
+        live = nd.CalibratingEKF().run(changed)
+        assert heading(smoothed, changed, start=LATE)[0] < 0.5  # degrees
+        error, within = heading(smoothed, changed, start=5.0)
+        assert (
+            error < 1.1 * heading(live, changed, start=5.0)[0]
+        )  # until it has been found, heading has the iron in it
+        assert within > 0.9
+
+
 def test_sums_turn_with_the_navigation_axes():
     rng = np.random.default_rng(9)
     R = Rotation.random(20, random_state=9)

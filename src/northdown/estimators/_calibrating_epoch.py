@@ -42,6 +42,7 @@ from northdown.estimators._calibrating_layout import (
     GYR_BIAS,
     GYR_MATRIX,
     HEADING_SLOPE,
+    IRON_TURNED,
     LAST_FORCE,
     LOST,
     LOW_FORCE,
@@ -52,6 +53,7 @@ from northdown.estimators._calibrating_layout import (
     MOTION,
     N_BLOCK,
     N_BLOCKS,
+    NEW_HEADING,
     OFFSET,
     RATE_SQUARE,
     REST_OFFSET,
@@ -99,7 +101,8 @@ def close_epoch(p: Any, s: Any) -> None:
     """End of an epoch: propagate the covariance, take the measurements, correct the nominal values."""
     time = s[TIME]
     s[COASTED], s[LOST] = coasted(s, time), s[MISSED]
-    s[MISSED] = 0.0
+    s[NEW_HEADING] = s[IRON_TURNED]
+    s[MISSED] = s[IRON_TURNED] = 0.0
     propagate(p, s, time)
     for a in range(3):
         s[SPEED + a] += s[SHIFT + a]
@@ -214,6 +217,7 @@ def propagate(p: Any, s: Any, time: float) -> None:
         s[COV + (OFFSET + a) * (WIDTH + 1)] += p.offset * forget
         for k in range(3):
             s[COV + (MATRIX + 3 * k + a) * (WIDTH + 1)] += p.matrix * forget
+    s[COV + (ATTITUDE + 2) * (WIDTH + 1)] += s[NEW_HEADING]
     s[COV + DELAY * (WIDTH + 1)] += p.delay * forget
 
 

@@ -37,8 +37,6 @@ from northdown.estimators._calibrating_iron import (
     forget_iron,
 )
 from northdown.estimators._calibrating_layout import (
-    ATTITUDE,
-    COV,
     ERROR,
     FIELD,
     FIELD_SQUARE,
@@ -46,6 +44,7 @@ from northdown.estimators._calibrating_layout import (
     IRON_CENTRE,
     IRON_HEADING,
     IRON_STATE,
+    IRON_TURNED,
     IRON_VARIANCE,
     IRON_WRONG,
     MAG_IRON,
@@ -55,7 +54,6 @@ from northdown.estimators._calibrating_layout import (
 )
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import dot, rotate
-from northdown.kernels.rows import WIDTH
 from northdown.kernels.weighting import REJECTED
 
 NONE: Final = 0.0
@@ -150,9 +148,10 @@ def _begin_without(s: Any, h: Any, mean: Any) -> None:
     s[MEAN_DEPARTURE] = s[NEW_FIELD + 2] = 0.0
     forget_iron(s)
     if square > 0.0:
-        s[ERROR + 2] -= math.atan2(y, x)
+        turn = math.atan2(y, x)
+        s[ERROR + 2] -= turn
         vx, vy, vz = iron_variances(s)
-        s[COV + (ATTITUDE + 2) * (WIDTH + 1)] += (vx + vy + vz) / (3.0 * square)
+        s[IRON_TURNED] = turn * turn + (vx + vy + vz) / (3.0 * square)
 
 
 @inline

@@ -43,15 +43,16 @@ CLIPPED: Final = 46  # standard deviation of the angle lost at the end of the ra
 COASTED: Final = 49  # what acceleration that lasts adds to the variance of velocity
 LOST: Final = 50  # what an attitude that must be wrong adds to its variance
 UNSEEN: Final = 51  # variance of the turn that a long step may have hidden
-TURN: Final = 52  # Σ R dt by rows
-SCALED: Final = 61  # Σ R r_k dt in motion, three matrices by rows, one after the other
-REST_TURN: Final = 88  # Σ R dt at rest
-FORCE: Final = 97  # Σ R a dt
-N_MOVE: Final = 59  # numbers from TIME to FORCE
-SHIFT: Final = 100  # Σ (R a + g) dt
-FIELD_SUM: Final = 103
-FIELD_SLOPE: Final = 106  # its derivative with respect to the delay
-BLOCK: Final = 109  # the epoch's statistics, as `kernels.stillness` keeps them
+NEW_HEADING: Final = 52  # variance of a heading that has been found wrong
+TURN: Final = 53  # Σ R dt by rows
+SCALED: Final = 62  # Σ R r_k dt in motion, three matrices by rows, one after the other
+REST_TURN: Final = 89  # Σ R dt at rest
+FORCE: Final = 98  # Σ R a dt
+N_MOVE: Final = 60  # numbers from TIME to FORCE
+SHIFT: Final = 101  # Σ (R a + g) dt
+FIELD_SUM: Final = 104
+FIELD_SLOPE: Final = 107  # its derivative with respect to the delay
+BLOCK: Final = 110  # the epoch's statistics, as `kernels.stillness` keeps them
 N_BLOCK: Final = 10
 SUMS_END: Final = BLOCK + N_BLOCK
 
@@ -106,7 +107,8 @@ IRON_CENTRE: Final = IRON_STATE + 1  # the iron expected
 IRON_VARIANCE: Final = IRON_CENTRE + 3  # its variance; infinite where only its usual size is known
 IRON_HEADING: Final = IRON_VARIANCE + 1  # variance of heading from what the iron found may be wrong by
 IRON_WRONG: Final = IRON_HEADING + 1  # for how long the field has not been as it should be without it
-FIELD_SUMS: Final = IRON_WRONG + 1  # sums as those above, of the field with the iron in it
+IRON_TURNED: Final = IRON_WRONG + 1  # variance of the heading that was wrong by it, for the next epoch
+FIELD_SUMS: Final = IRON_TURNED + 1  # sums as those above, of the field with the iron in it
 FIELD_SQUARE: Final = FIELD_SUMS + 16
 
 # Seven scalar measurements of an epoch: velocity, heading, rest. Of each 1/S (0: not taken) and y/S.

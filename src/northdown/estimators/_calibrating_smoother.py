@@ -17,6 +17,7 @@ from northdown.estimators._calibrating_forth import (
     AFTER,
     BEFORE,
     BEGIN,
+    DIAGNOSTICS,
     END,
     LATE,
     N_RECORD,
@@ -78,21 +79,29 @@ def smooth(
     span = (time.max() - time[0]) / work.params[Terms._fields.index("epoch")] if n else 0.0
     records = np.empty((min(n, int(1.5 * span) + 2), N_RECORD))
     state, start = work.state.copy(), np.empty(N_START)
-    while True:
+
+    def go() -> int:
+        flags[:] = 0
         code, done, kept = forth(kernel)(
             work.params, work.state, rest_rate, time, *sensors, rate, out, flags, records, start
         )
         if code:
             stream._raise(code, time[done], first + done)
-        if work.state[N_RUNNER + IRON_STATE] == FOUND:
-            # Once more, without the iron that was found by the end.
-            state[KEPT_IRON] = work.state[KEPT_IRON]
-            state[N_RUNNER + IRON_STATE] = GIVEN_IRON
-            work.state[:] = state
-            flags[:] = 0
-            continue
-        if not start[LATE]:
-            break
+        return int(kept)
+
+    kept = go()
+    if work.state[N_RUNNER + IRON_STATE] == FOUND:
+        # Once more without the iron that was found by the end, unless it has not been there from the beginning.
+        departure = _mean_departure(out)
+        live = state.copy()
+        state[KEPT_IRON] = work.state[KEPT_IRON]
+        state[N_RUNNER + IRON_STATE] = GIVEN_IRON
+        work.state[:] = state
+        kept = go()
+        if _mean_departure(out) > departure:
+            work.state[:] = state = live
+            kept = go()
+    if start[LATE]:
         # The attitude was found late: once more, with what is now known of the beginning.
         work.state[:] = state
         work.state[PENDING] = flags[-1] & (TILT_UNKNOWN | HEADING_UNKNOWN)
@@ -100,7 +109,7 @@ def smooth(
         tilt = work.state[N_RUNNER + COV :]
         tilt[0] = tilt[WIDTH + 1] = _FOUND_LATE**2
         tilt[2 * WIDTH + 2] = math.pi**2 / 3.0
-        flags[:] = 0
+        kept = go()
     records, smoothed = records[:kept], np.empty((kept, 18))
     if not start[LATE]:
         _second_pass(work.params, start[BEGIN:], records, most, walk)
@@ -108,6 +117,11 @@ def smooth(
     doubt = heading_doubt(Terms(*work.params[:N_TERMS]), work.state[N_RUNNER:])
     spread()(work.params, work.turn, doubt, time, records, smoothed, out)
     return flags, out
+
+
+def _mean_departure(out: Array) -> float:
+    """Of the field from its reference, on the way forth: small where the iron taken out is that of the time."""
+    return float(np.log1p(out[:, DIAGNOSTICS]).mean())
 
 
 def _second_pass(params: Array, begin: Array, records: Array, most: float, walk: float) -> None:
