@@ -195,16 +195,30 @@ def accuracy(trials: list[Trial]) -> dict[str, object]:
 
 
 def clocks(trials: list[Trial], offsets: list[ClockOffset]) -> None:
-    """What the offsets of the trials have in common: of one system they should be the same."""
-    rows = {t.name: [f"{1e3 * c.offset:+.3f}", f"{1e3 * c.sigma:.3f}"] for t, c in zip(trials, offsets, strict=True)}
-    for data, chosen in (("BROAD", True), ("RepoIMU", False)):
-        found = np.array(
-            [(c.offset, c.sigma) for t, c in zip(trials, offsets, strict=True) if chosen == (t.group != "RepoIMU")]
-        )
-        if len(found) > 1:
-            mean, scatter = 1e3 * found[:, 0].mean(), 1e3 * found[:, 0].std(ddof=1)
-            rows[f"mean {data}"] = [f"{mean:+.3f}", f"{scatter:.3f} (scatter)"]
-    table("Gyroscope behind the reference, ms", "trial", ["offset", "sigma"], rows)
+    """What the offsets of the trials have in common, and the error of an estimate that has no other."""
+    both = list(zip(trials, offsets, strict=True))
+    made = {t.name: of_offset(t, c.offset) for t, c in both}
+    rows = {t.name: [f"{1e3 * c.offset:+.3f}", f"{1e3 * c.sigma:.3f}", f"{made[t.name]:.3f}"] for t, c in both}
+    for name, group in (
+        ("BROAD", {"undisturbed", "disturbed"}),
+        ("undisturbed", {"undisturbed"}),
+        ("RepoIMU", {"RepoIMU"}),
+    ):
+        chosen = [(1e3 * c.offset, made[t.name]) for t, c in both if t.group in group]
+        if len(chosen) > 1:
+            found, inclination = np.array(chosen).T
+            cells = [f"{found.mean():+.3f}", f"{found.std(ddof=1):.3f} (scatter)", f"{inclination.mean():.3f}"]
+            rows[f"mean {name}"] = cells
+    table("Gyroscope behind the reference, ms", "trial", ["offset", "sigma", "inclination by it alone, °"], rows)
+
+
+def of_offset(trial: Trial, offset: float) -> float:
+    """RMS error of inclination (degrees) of the truth itself when its clock is off by so much (s)."""
+    truth = Rotation.from_quat(np.roll(trial.truth, -1, axis=1))
+    late = truth * Rotation.from_rotvec(offset * trial.recording.gyr[trial.index]) * truth.inv()
+    _, x, y, _ = np.roll(late.as_quat(), 1, axis=1).T
+    inclination = 2.0 * np.arcsin(np.minimum(np.hypot(x, y), 1.0))
+    return float(np.rad2deg(np.sqrt(np.mean(inclination**2))))
 
 
 def ablation(trials: list[Trial]) -> dict[str, object]:
