@@ -8,6 +8,7 @@
     frame = "body"
 
     # rate = g - gyr_bias - gyr_matrix · g, for the gyroscope's output g
+    # field = m - mag_iron, for the magnetometer's output m of mag_delay later
     [gyr_bias]
     unit = "rad/s"
     value = [0.001, -0.002, 0.0005]
@@ -62,6 +63,7 @@ def save(known: LearntCalibration, path: str | os.PathLike[str]) -> None:
     else:
         lines = [f"{key} = {toml_value(value)}" for key, value in _HEAD.items()]
         lines += ["", "# rate = g - gyr_bias - gyr_matrix · g, for the gyroscope's output g"]
+        lines += ["# field = m - mag_iron, for the magnetometer's output m of mag_delay later"]
         for name, table in tables.items():
             lines += [f"[{name}]", *(f"{key} = {toml_value(value)}" for key, value in table.items()), ""]
         text = "\n".join(lines)
