@@ -51,6 +51,20 @@ def test_level_turn_is_coasted_through(method):
     assert np.abs(acceleration - 4.0).max() < 1.0  # m/s², by an attitude that is a degree or two off
 
 
+def test_a_smoother_sees_when_it_began():
+    """Real time has been tilted by then; what comes after shows that."""
+    recording = ride(4.0)
+    onset = (recording.time > 20.0) & (recording.time < 34.0)
+    live, smoothed = (getattr(nd.CalibratingEKF(), method)(recording) for method in ("run", "smooth"))
+    believing = nd.CalibratingEKF(heading_outlier=0.0, smooth_walk=1.0).smooth(recording)  # no second pass
+    tilt = [nd.attitude_error(o, recording, mask=onset).rmse().inclination_deg for o in (live, believing, smoothed)]
+    assert tilt[2] < 0.3  # degrees
+    assert tilt[2] < 0.5 * min(tilt[:2])
+    error = nd.attitude_error(smoothed, recording, mask=recording.time > 20.0)
+    sigma = np.sqrt(np.einsum("nii->ni", smoothed.covariance[error.index]))
+    assert (np.abs(error.rotvec[:, :2]) < 3.0 * sigma[:, :2]).mean() > 0.95
+
+
 def test_acceleration_that_does_not_show_in_the_norm_is_not_held_for_long():
     """1 m/s² makes the norm 0.5 % larger, less than the gate: flags say so only at the beginning."""
     recording = ride(1.0)

@@ -3,7 +3,7 @@
 The epochs are filtered about the nominal values of the first pass, without a look at the samples. The first pass
 corrected its nominal values by d after each epoch, so that of an error m then m − d is left. Headings have the
 weights of `_calibrating_weights`, and the bias its own random walk: in the first pass the bias also makes up for what
-is not yet known of the calibration.
+is not yet known of the calibration. Velocity is left alone in the seconds before an acceleration that lasts was seen.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from northdown.estimators._calibrating_layout import (
     GAINS,
     GIVEN,
     GYR_BIAS,
+    HOLD,
     MAG_DELAY,
     MOTION,
     N_MOVE,
@@ -69,8 +70,8 @@ MOVE: Final = 13  # sums from time and squares to Σ R dt, Σ R r dt, Σ R dt at
 MEASURED: Final = MOVE + N_MOVE  # from 1/S and y/S of seven measurements to their noise
 CORRECTION: Final = MEASURED + N_TAKEN  # of the nominal values, by the measurements
 MEAN: Final = CORRECTION + N  # error that is left after it, of attitude and bias: that of a second pass
-SEEN: Final = MEAN + 6  # sum of the field (NED), its samples, departure by which it was weighed, stillness
-KEPT_GAINS: Final = SEEN + 6
+SEEN: Final = MEAN + 6  # sum of the field (NED), its samples, departure by which it was weighed, stillness, hold
+KEPT_GAINS: Final = SEEN + 7
 KEPT_COV: Final = KEPT_GAINS + 7 * N  # rows of attitude and bias
 N_RECORD: Final = KEPT_COV + 6 * N
 
@@ -194,7 +195,7 @@ def _keep(s: Array, i: int, fresh: bool, row: Array) -> None:
         row[MEAN + j] = 0.0
     for a in range(3):
         row[SEEN + a] = s[FIELD_SUM + a]
-    row[SEEN + 3], row[SEEN + 4], row[SEEN + 5] = s[COUNT_MAG], s[DEPARTURE], s[STILL]
+    row[SEEN + 3], row[SEEN + 4], row[SEEN + 5], row[SEEN + 6] = s[COUNT_MAG], s[DEPARTURE], s[STILL], s[HOLD]
     keep_taken(s, row)
 
 

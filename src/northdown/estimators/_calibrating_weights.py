@@ -32,7 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from northdown.estimators._calibrating_field import follow, judge_field
-from northdown.estimators._calibrating_forth import MEASURED, SEEN
+from northdown.estimators._calibrating_forth import MEASURED, MOVE, SEEN
 from northdown.estimators._calibrating_layout import MEAN_DEPARTURE, RAW, STILL, SUMS, TAKEN, Terms
 from northdown.kernels.jit import compiled
 from northdown.kernels.tuples import to_fixed_tuple
@@ -42,10 +42,22 @@ N_TERMS: Final = len(Terms._fields)
 
 HEADING_TAKEN: Final = MEASURED + 6  # 1/S, 0 where none was taken
 HEADING_NOISE: Final = MEASURED + RAW - TAKEN + 6
+ONSET: Final = 4.0
+"""Time (s) that it takes to see an acceleration that lasts."""
 _NORMAL: Final = 1.4826
 """Standard deviation of a normal distribution whose absolute values have the median 1."""
 _LEAST: Final = 0.01
 """Least scale of the residuals, as a part of the noise's standard deviation: without noise, nothing stands out."""
+
+
+def leave_onsets(records: Array) -> None:
+    """Take no velocity in the seconds before an acceleration that lasts was seen: it must have begun by then."""
+    held = records[:, SEEN + 6] > 0.0
+    time: Array = np.cumsum(records[:, MOVE])
+    for k in np.flatnonzero(held & ~np.append(False, held[:-1])):
+        before = (time > time[k] - ONSET) & (time <= time[k]) & (records[:, SEEN + 5] == 0.0)
+        for a in range(3):
+            records[before, MEASURED + 2 * a] = 0.0
 
 
 def reweigh(params: Array, records: Array, seen: Array, most: float) -> None:
