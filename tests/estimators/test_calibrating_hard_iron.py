@@ -124,6 +124,26 @@ def test_a_smoother_knows_that_it_was_not_always_there(seed):
         assert within > 0.9
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_a_magnetometer_that_is_stuck_is_no_iron(noise):
+    r = recording(3)
+    n = len(r)
+    stuck = np.tile(r.mag[0], (n, 1)) + noise * np.random.default_rng(1).normal(size=(n, 3))
+    estimate = nd.CalibratingEKF().run(dataclasses.replace(r, mag=stuck))
+    assert not estimate.diagnostics["mag_iron"].any()
+    assert estimate.has(nd.Flag.MAG_REJECTED)[r.time > 30.0].mean() > 0.5
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_any_unit_and_iron_beyond_the_field(factor):
+    """The filter knows the field by its own reference; 120 µT is what a telephone's magnetometer may begin with."""
+    r = recording(2, on_body=12.0 * IRON)
+    scaled = dataclasses.replace(r, mag=factor * r.mag)
+    estimate, found = nd.CalibratingEKF().learn(scaled, offline=True)
+    assert np.allclose(found.mag_iron / factor, 12.0 * IRON, atol=1.0)
+    assert heading(estimate, r, start=0.0)[0] < 2.0
+
+
 def test_sums_turn_with_the_navigation_axes():
     rng = np.random.default_rng(9)
     R = Rotation.random(20, random_state=9)

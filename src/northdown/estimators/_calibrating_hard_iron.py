@@ -65,6 +65,8 @@ OPEN: Final = 0.05
 """Largest part of the variance of the heading from iron that may still be open."""
 LEAST_TIME: Final = 20.0
 """Time (s) before which nothing is decided."""
+LEAST_FIELD: Final = 0.1
+"""Least field of a place, as a part of the iron: a magnetometer that is stuck shows iron and nothing else."""
 LASTING: Final = 5.0
 """Time (s) for which what iron does not explain lasts."""
 TINY: Final = 1e-300
@@ -110,7 +112,10 @@ def correct_iron(p: Any, s: Any, field: Any, age: float, u: float) -> bool:
     if not found:
         if not (s[FIELD_SUMS] > LEAST_TIME and still_open < OPEN and dot(pull, h) > p.iron_share * varies):
             return False
-        _begin_without(s, h, mean)
+        place = _field_without(s, h, mean)
+        if not dot(place, place) > LEAST_FIELD * LEAST_FIELD * dot(h, h):
+            return False
+        _begin_without(s, place)
     noise = max(EXPECTED * USUAL * USUAL * square, LASTING * (varies - dot(pull, h)))
     s[IRON_HEADING] = min(1.0, noise * still_open / (expected * max(s[FIELD] * s[FIELD], TINY)))
     for a in range(3):
@@ -135,14 +140,22 @@ def _is_gone(p: Any, s: Any, age: float, u: float) -> bool:
 
 
 @inline
-def _begin_without(s: Any, h: Any, mean: Any) -> None:
-    """Iron h has been found: another field is that of the place, and heading turns by what h has done to it."""
-    s[IRON_STATE] = FOUND
+def _field_without(s: Any, h: Any, mean: Any) -> Any:
+    """Field of the place, navigation axes, when the mean one has iron h in it."""
     k = 1.0 / s[FIELD_SUMS]
     r = FIELD_SUMS + 1
-    x = mean[0] - k * (s[r] * h[0] + s[r + 3] * h[1] + s[r + 6] * h[2])
-    y = mean[1] - k * (s[r + 1] * h[0] + s[r + 4] * h[1] + s[r + 7] * h[2])
-    z = mean[2] - k * (s[r + 2] * h[0] + s[r + 5] * h[1] + s[r + 8] * h[2])
+    return (
+        mean[0] - k * (s[r] * h[0] + s[r + 3] * h[1] + s[r + 6] * h[2]),
+        mean[1] - k * (s[r + 1] * h[0] + s[r + 4] * h[1] + s[r + 7] * h[2]),
+        mean[2] - k * (s[r + 2] * h[0] + s[r + 5] * h[1] + s[r + 8] * h[2]),
+    )
+
+
+@inline
+def _begin_without(s: Any, place: Any) -> None:
+    """Iron has been found: the field of the place is another one, and heading turns by what iron has done to it."""
+    x, y, z = place
+    s[IRON_STATE] = FOUND
     square = x * x + y * y
     s[FIELD], s[FIELD + 1] = math.sqrt(square), z
     s[MEAN_DEPARTURE] = s[NEW_FIELD + 2] = 0.0
