@@ -3,7 +3,8 @@
 The epochs are filtered about the nominal values of the first pass, without a look at the samples. The first pass
 corrected its nominal values by d after each epoch, so that of an error m then m − d is left. Headings have the
 weights of `_calibrating_weights`, and the bias its own random walk: in the first pass the bias also makes up for what
-is not yet known of the calibration. Velocity is left alone in the seconds before an acceleration that lasts was seen.
+is not yet known of the calibration. Velocity is left alone for some seconds before and after an acceleration that
+lasts.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from northdown.estimators._calibrating_hard_iron import FOUND, GIVEN_IRON
 from northdown.estimators._calibrating_iron import heading_doubt
 from northdown.estimators._calibrating_layout import COV, FIELD_SQUARE, IRON_STATE, MAG_IRON, Terms
 from northdown.estimators._calibrating_result import ahead, covariance_of
-from northdown.estimators._calibrating_weights import leave_onsets, reweigh
+from northdown.estimators._calibrating_weights import leave_travel, reweigh
 from northdown.estimators._stream import Stream, all_samples
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.quaternion import congruent, conjugate, multiply, normalize, whole_axes
@@ -125,14 +125,14 @@ def _mean_departure(out: Array) -> float:
 
 
 def _second_pass(params: Array, begin: Array, records: Array, most: float, walk: float) -> None:
-    """Filter the epochs again: headings that stand out count less, the bias has its own walk, onsets are left out."""
+    """Filter the epochs again: headings that stand out count less, the bias has its own walk, travel is left out."""
     if most == 0.0 and walk == 1.0:
         return
     if most > 0.0:
         seen = np.empty((len(records), 3))
         residuals()(records, seen)
         reweigh(params, records, seen, most)
-    leave_onsets(records)
+    leave_travel(records)
     changed = params.copy()
     changed[Terms._fields.index("walk")] *= walk * walk
     again()(changed, begin, records)

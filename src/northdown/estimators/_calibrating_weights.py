@@ -33,7 +33,17 @@ import numpy.typing as npt
 
 from northdown.estimators._calibrating_field import follow, judge_field
 from northdown.estimators._calibrating_forth import MEASURED, MOVE, SEEN
-from northdown.estimators._calibrating_layout import MEAN_DEPARTURE, RAW, STILL, SUMS, TAKEN, Terms
+from northdown.estimators._calibrating_layout import (
+    FORCE,
+    MEAN_DEPARTURE,
+    RAW,
+    STILL,
+    SUMS,
+    TAKEN,
+    TIME,
+    TIME_ACC,
+    Terms,
+)
 from northdown.kernels.jit import compiled
 from northdown.kernels.tuples import to_fixed_tuple
 
@@ -42,22 +52,34 @@ N_TERMS: Final = len(Terms._fields)
 
 HEADING_TAKEN: Final = MEASURED + 6  # 1/S, 0 where none was taken
 HEADING_NOISE: Final = MEASURED + RAW - TAKEN + 6
-ONSET: Final = 4.0
-"""Time (s) that it takes to see an acceleration that lasts."""
+_FORCE: Final = MOVE + FORCE - TIME
+_TIME_ACC: Final = MOVE + TIME_ACC - TIME
+RESTING_FORCE: Final = 0.2
+"""Horizontal force (m/s²) above which a body near a hold is not at rest, or tilted by 1.2°."""
+AROUND_HOLD: Final = 5.0
+"""Time (s) before and after a hold in which the body travels, though its acceleration does not show."""
 _NORMAL: Final = 1.4826
 """Standard deviation of a normal distribution whose absolute values have the median 1."""
 _LEAST: Final = 0.01
 """Least scale of the residuals, as a part of the noise's standard deviation: without noise, nothing stands out."""
 
 
-def leave_onsets(records: Array) -> None:
-    """Take no velocity in the seconds before an acceleration that lasts was seen: it must have begun by then."""
-    held = records[:, SEEN + 6] > 0.0
+def leave_travel(records: Array) -> None:
+    """Take no velocity shortly before and after a hold, as the body travels then, too.
+
+    What looks like rest is left out where horizontal force shows the beginning or the end of a smooth acceleration.
+    """
     time: Array = np.cumsum(records[:, MOVE])
-    for k in np.flatnonzero(held & ~np.append(False, held[:-1])):
-        before = (time > time[k] - ONSET) & (time <= time[k]) & (records[:, SEEN + 5] == 0.0)
-        for a in range(3):
-            records[before, MEASURED + 2 * a] = 0.0
+    seen = time[records[:, SEEN + 6] > 0.0]
+    if not len(seen):
+        return
+    later = np.searchsorted(seen, time)
+    before = np.abs(seen[np.minimum(later, len(seen) - 1)] - time) < AROUND_HOLD
+    after = np.abs(time - seen[np.maximum(later - 1, 0)]) < AROUND_HOLD
+    force = np.hypot(records[:, _FORCE], records[:, _FORCE + 1]) / np.maximum(records[:, _TIME_ACC], 1e-9)
+    near = (before | after) & ((records[:, SEEN + 5] == 0.0) | (force > RESTING_FORCE))
+    for a in range(3):
+        records[near, MEASURED + 2 * a] = 0.0
 
 
 def reweigh(params: Array, records: Array, seen: Array, most: float) -> None:

@@ -109,7 +109,7 @@ Smoother
 both once more over the epochs, and spreads the corrections evenly between epochs. The second pass weighs headings by
 the field as the smoothed attitude shows it, by what follows as well as by what was before, and by what they miss the
 smoothed trajectory by (see `_calibrating_weights`). The bias has `smooth_walk` of its random walk there. Velocity is
-not taken in the four seconds before an acceleration that lasts was seen.
+not taken in the five seconds before and after an acceleration that lasts.
 
 Sources: error in navigation axes: J. Solà, arXiv:1711.02508 (2017), section 7; velocity held near zero for tilt: the
 principle of the low-pass in an almost inertial frame of D. Laidig, T. Seel, Information Fusion 91 (2023),
