@@ -1,6 +1,6 @@
-r"""Weights of the headings in the second pass of the calibrating filter's smoother.
+r"""Weights of the headings in the second pass of the calibrating filter's smoother, and the velocities it leaves out.
 
-They differ from those of the first pass in two ways.
+The weights differ from those of the first pass in two ways.
 
 The departure u of the field is that by the smoothed attitude, and it counts for its mean over the `gate_window` that
 follows too: real time knows that a magnet comes near only when it is there.
@@ -15,6 +15,9 @@ What a heading misses the smoothed trajectory by is known without the covariance
 A heading with \|r\| above k times the scale s, which is 1.4826 times the median of all \|r\|, gets the variance
 R (r / k s)². Its weight then falls with the square of r, as it does in the tail of Student's t: a field that is
 wrong by much bears on little, and headings within k s keep their weight.
+
+Velocity is not taken within `AROUND_HOLD` of a hold (see `_calibrating_acceleration`): an acceleration that lasts is
+seen some seconds after it has begun, and a vehicle goes on when it no longer accelerates.
 
 Source: weights as in K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Amer. Stat. Assoc. 84(408) (1989),
 doi:10.1080/01621459.1989.10478852; smoothed residuals: J. Durbin, S. J. Koopman, "Time Series Analysis by State Space
