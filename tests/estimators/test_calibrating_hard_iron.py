@@ -97,6 +97,15 @@ def test_it_is_kept_for_the_next_run(tmp_path):
     assert np.linalg.norm(better - IRON) < 0.3 * np.sqrt(3.0)
 
 
+def test_a_run_without_magnetometer_says_nothing_of_iron():
+    r = recording(4, seconds=80.0)
+    blind = nd.CalibratingEKF().learn(dataclasses.replace(r, mag=None))[1]
+    assert np.all(blind.mag_iron == 0.0)
+    assert np.all(blind.mag_iron_sigma > 100.0)  # µT: more than any field
+    found = nd.CalibratingEKF().learn(r, known=blind)[1]
+    assert np.allclose(found.mag_iron, IRON, atol=0.3)
+
+
 def test_iron_that_is_gone_is_forgotten():
     r = recording(7, seconds=300.0)
     gone = r.time > 120.0

@@ -69,6 +69,8 @@ LEAST_FIELD: Final = 0.1
 """Least field of a place, as a part of the iron: a magnetometer that is stuck shows iron and nothing else."""
 LASTING: Final = 5.0
 """Time (s) for which what iron does not explain lasts."""
+UNSEEN_SIGMA: Final = 1e3
+"""Standard deviation (µT) of the iron when no field has been seen."""
 TINY: Final = 1e-300
 
 
@@ -217,6 +219,8 @@ def iron_sigma(s: FloatArray) -> FloatArray:
     import numpy as np
 
     square = s[FIELD] ** 2 + s[FIELD + 1] ** 2
+    if not square > 0.0:
+        return np.full(3, min(math.sqrt(s[IRON_VARIANCE]), UNSEEN_SIGMA))
     variance = np.minimum(iron_variances(s), min(float(s[IRON_VARIANCE]), USUAL**2 * square))
     if s[IRON_STATE] == NONE and s[FIELD_SUMS] > 0.0:
         centre = tuple(s[IRON_CENTRE : IRON_CENTRE + 3])
