@@ -8,6 +8,7 @@ import numpy as np
 
 from northdown._validation import FloatArray
 from northdown.checks.base import Finding, Severity, Signals, count, duration, percent
+from northdown.kernels.holes import LONGEST_HOLE
 
 _FEW = 10
 # Standard deviation of the step, relative to it, above which the true sample times are in doubt.
@@ -72,7 +73,11 @@ def gaps(s: Signals) -> Iterator[Finding]:
     lost = int(np.rint(step / s.step - 1.0).sum()) if s.step > 0.0 else 0
     longest = float(step.max())
     severity: Severity = "warning" if longest > _LONG_GAP else "note"
-    do = "; a turn within it is not seen: cut the recording there (Recording.between)" if longest > _LONG_GAP else ""
+    do = ""
+    if longest > LONGEST_HOLE:
+        do = "; a turn within it is not seen, and tilt and heading begin anew after it"
+    elif longest > _LONG_GAP:
+        do = "; a turn within it is not seen: cut the recording there (Recording.between)"
     yield Finding(
         "time-gap",
         severity,

@@ -156,7 +156,8 @@ from northdown.estimators._calibrating_result import DIAGONAL, START_SPEED, alig
 from northdown.estimators._calibrating_step import step
 from northdown.estimators._stream import Stream, outputs
 from northdown.frames import Frame
-from northdown.kernels.runner import LONGEST_HOLE, MAX_GAP, N_RUNNER, Kernel
+from northdown.kernels.holes import LONGEST_HOLE
+from northdown.kernels.runner import MAX_GAP, N_RUNNER, Kernel
 from northdown.orientation import Flag, Orientation
 from northdown.recording import Recording
 

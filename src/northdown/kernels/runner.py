@@ -23,6 +23,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from northdown.kernels.holes import LONGEST_HOLE
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.numpy_abi import IN_PLACE, THROUGH_NUMBA, Reading, layout_holds
 from northdown.kernels.quaternion import congruent, dot, down_b, multiply, whole_axes
@@ -38,9 +39,6 @@ MAX_GAP: Final = 6  # longest time (s) for which a rate is held
 PERIOD: Final = 7  # time (s) from one live sample to the next where none is given; NaN when not known
 COUNT: Final = 8  # samples done
 N_RUNNER: Final = 9
-
-# Longest time (s) without samples over which an attitude is carried on; after a longer one it is found anew.
-LONGEST_HOLE: Final = 1.0
 
 # Stands for the time of a live sample that has none of its own: a number that no clock gives.
 NEXT: Final = -1.7e308
