@@ -67,6 +67,8 @@ def test_where_there_is_none_nothing_changes():
             with_, without = (getattr(nd.CalibratingEKF(iron_share=share), run)(r) for share in (0.8, 1.0))
             assert np.array_equal(with_.quat, without.quat)
             assert np.array_equal(with_.covariance, without.covariance)
+    exact = measure(random_motion(60.0, seed=1), rate=100.0)
+    assert not nd.CalibratingEKF().run(exact).diagnostics["mag_iron"].any()
 
 
 def test_a_stream_is_the_batch():

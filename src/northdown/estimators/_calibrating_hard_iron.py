@@ -67,6 +67,8 @@ LEAST_TIME: Final = 20.0
 """Time (s) before which nothing is decided."""
 LEAST_FIELD: Final = 0.1
 """Least field of a place, as a part of the iron: a magnetometer that is stuck shows iron and nothing else."""
+LEAST_IRON: Final = 0.005
+"""Least iron, as a part of the field: without any noise, the estimate's own errors may look like less."""
 LASTING: Final = 5.0
 """Time (s) for which what iron does not explain lasts."""
 UNSEEN_SIGMA: Final = 1e3
@@ -115,7 +117,8 @@ def correct_iron(p: Any, s: Any, field: Any, age: float, u: float) -> bool:
         if not (s[FIELD_SUMS] > LEAST_TIME and still_open < OPEN and dot(pull, h) > p.iron_share * varies):
             return False
         place = _field_without(s, h, mean)
-        if not dot(place, place) > LEAST_FIELD * LEAST_FIELD * dot(h, h):
+        field_square, iron_square = dot(place, place), dot(h, h)
+        if not (field_square > LEAST_FIELD**2 * iron_square and iron_square > LEAST_IRON**2 * field_square):
             return False
         _begin_without(s, place)
     noise = max(EXPECTED * USUAL * USUAL * square, LASTING * (varies - dot(pull, h)))
