@@ -1,11 +1,13 @@
 """The calibrating filter against VQF: accuracy, ablations, coverage, cross-validation and time, in one run.
 
-    python benchmarks/flagship.py [--root DIR] [--part accuracy,ablation,coverage,iron,time,cross] [--json FILE]
+    python benchmarks/flagship.py [--root DIR] [--part accuracy,ablation,coverage,iron,time,delay,cross,…]
+                                   [--json FILE]
 
 One set of parameters for everything. `cross` chooses the parameters anew for each trial that is left out, from the
 same start and on the other trials only, by the cross-entropy method (see `_search.py`); what is reported is the error
 on the trial that was left out. The cost is the mean logarithm of the errors, real time and smoothed; RepoIMU takes
-part as a guard. It takes an hour and a half. See README.md in this folder.
+part as a guard. It takes an hour and a half. `delay` and `cross-delay` tell the filter the gyroscope's delay as the
+other trials show it, which is a calibration of the sensor and no default. See README.md in this folder.
 """
 
 from __future__ import annotations
@@ -233,9 +235,33 @@ def ablation(trials: list[Trial]) -> dict[str, object]:
     return found
 
 
-def _totals(filter_: nd.CalibratingEKF, trial: Trial) -> tuple[float, float]:
+def delays(trials: list[Trial]) -> list[float]:
+    """Delay (s) of each trial's gyroscope, as the other trials of BROAD's sensor show it; 0 for RepoIMU's."""
+    found = np.array([nd.clock_offset(t.recording).offset for t in trials])
+    broad = np.array([t.group != "RepoIMU" for t in trials])
+    others = [broad & (np.arange(len(trials)) != k) for k in range(len(trials))]
+    return [float(found[o].mean()) if here and o.any() else 0.0 for here, o in zip(broad, others, strict=True)]
+
+
+def delay_given(trials: list[Trial]) -> dict[str, object]:
+    """Accuracy, clocks as recorded, when the filter is told the gyroscope's delay: one number for a sensor."""
+    values = {"real time": [], "smoothed": []}
+    for trial, delay in zip(trials, delays(trials), strict=True):
+        for name, way in (("real time", "run"), ("smoothed", "smooth")):
+            values[name].append(figures(trial.error(getattr(ours(gyr_delay=delay), way)(trial.recording))))
+    grouped = {name: means(trials, np.array(v)) for name, v in values.items()}
+    rows = {
+        f"mean {group}": ["{:.3f} ({:.3f}, {:.3f})".format(*grouped[name][group]) for name in values]
+        for group in grouped["smoothed"]
+    }
+    title = "RMSE total (heading, inclination), degrees, clocks as recorded, gyr_delay from the other trials"
+    table(title, "of", list(values), rows)
+    return {name: {t.name: list(e) for t, e in zip(trials, v, strict=True)} for name, v in values.items()}
+
+
+def _totals(filter_: nd.CalibratingEKF, trial: Trial, delay: float = 0.0) -> tuple[float, float]:
     """Total error, real time and smoothed; RepoIMU by the rotations found beforehand."""
-    r = trial.recording
+    r, filter_ = trial.recording, dataclasses.replace(filter_, gyr_delay=delay)
     return trial.total(filter_.run(r, frame="NED")), trial.total(filter_.smooth(r, frame="NED"))
 
 
@@ -316,12 +342,13 @@ def _named(point: _search.Point) -> str:
     return ", ".join(f"{name} {value:.2g}" for name, value in point.items())
 
 
-def cross(trials: list[Trial]) -> dict[str, object]:
+def cross(trials: list[Trial], known_delay: bool = False) -> dict[str, object]:
     """Leave one trial of BROAD out, choose on the others, report on the one left out."""
+    delay = delays(trials) if known_delay else [0.0] * len(trials)
     guard = np.array([t.group == "RepoIMU" for t in trials])
 
     def errors(point: _search.Point) -> np.ndarray:
-        return np.array([_totals(ours(**point), t) for t in trials])
+        return np.array([_totals(ours(**point), t, d) for t, d in zip(trials, delay, strict=True)])
 
     def costs(point: _search.Point) -> np.ndarray:
         return np.log(errors(point)).sum(axis=1)
@@ -397,7 +424,9 @@ PARTS = {
     "coverage": coverage,
     "iron": iron,
     "time": speed,
+    "delay": delay_given,
     "cross": cross,
+    "cross-delay": lambda trials: cross(trials, known_delay=True),
 }
 
 
