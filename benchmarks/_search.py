@@ -22,9 +22,11 @@ BEST_FIRST, BEST_SECOND = 0.05, 0.1
 Point = dict[str, float]
 
 
-def draw(centre: np.ndarray, scatter: np.ndarray, n: int, allowed: Callable[[np.ndarray], bool]) -> np.ndarray:
-    """Points (n, k) around a centre, all logarithms; those that are not allowed are drawn again. Same seed always."""
-    rng = np.random.default_rng(1)
+def draw(
+    centre: np.ndarray, scatter: np.ndarray, n: int, allowed: Callable[[np.ndarray], bool], seed: int
+) -> np.ndarray:
+    """Points (n, k) around a centre, all logarithms; those that are not allowed are drawn again."""
+    rng = np.random.default_rng(seed)
     found: list[np.ndarray] = []
     while len(found) < n:
         point = centre + scatter * rng.standard_normal(len(centre))
@@ -45,12 +47,15 @@ class Search:
     `costs` gives those of all trials at a point; `allowed` whether the filter takes it.
     """
 
-    def __init__(self, start: Point, costs: Callable[[Point], np.ndarray], allowed: Callable[[Point], bool]) -> None:
+    def __init__(
+        self, start: Point, costs: Callable[[Point], np.ndarray], allowed: Callable[[Point], bool], seed: int
+    ) -> None:
+        self._seed = seed
         self._names = tuple(start)
         self._costs = costs
         self._allowed = lambda logs: allowed(self.point(logs))
         centre = np.log(list(start.values()))
-        self._points = draw(centre, np.full(len(centre), SCATTER), FIRST, self._allowed)
+        self._points = draw(centre, np.full(len(centre), SCATTER), FIRST, self._allowed, seed)
         self._first = np.array([costs(self.point(p)) for p in self._points])
 
     def point(self, logs: np.ndarray) -> Point:
@@ -58,6 +63,6 @@ class Search:
 
     def choose(self, weight: np.ndarray) -> Point:
         """What the weighed sum of the trials' costs leads to."""
-        points = draw(*best(self._points, self._first @ weight, BEST_FIRST), SECOND, self._allowed)
+        points = draw(*best(self._points, self._first @ weight, BEST_FIRST), SECOND, self._allowed, self._seed)
         cost = np.array([self._costs(self.point(p)) @ weight for p in points])
         return self.point(best(points, cost, BEST_SECOND)[0])

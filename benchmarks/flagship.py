@@ -14,6 +14,7 @@ and is left out of `all`. See README.md in this folder.
 from __future__ import annotations
 
 import argparse
+import concurrent.futures
 import dataclasses
 import json
 import os
@@ -59,6 +60,9 @@ START = {
 }
 GUARD = 0.5
 """Weight of RepoIMU's mean error beside BROAD's in the choice."""
+
+SEEDS = (1, 2, 3)
+"""Of the points that `cross` draws; what it reports is the mean over them."""
 
 ABLATIONS = {
     "as it is": {},
@@ -339,13 +343,31 @@ def iron(trials: list[Trial], draws: int = 3) -> dict[str, object]:
     return dict(found)
 
 
-def _named(point: _search.Point) -> str:
-    return ", ".join(f"{name} {value:.2g}" for name, value in point.items())
-
-
 def cross(trials: list[Trial], known_delay: bool = False) -> dict[str, object]:
-    """Leave one trial of BROAD out, choose on the others, report on the one left out."""
+    """Leave one trial of BROAD out, choose on the others, report on the one left out; mean over the seeds."""
     delay = delays(trials) if known_delay else [0.0] * len(trials)
+    with concurrent.futures.ProcessPoolExecutor(min(len(SEEDS), os.cpu_count() or 1)) as workers:
+        found = list(workers.map(_cross_of_seed, [trials] * len(SEEDS), [delay] * len(SEEDS), SEEDS))
+    names = [t.name for t in trials if t.group != "RepoIMU"]
+    held = np.array([[f["left out"][name] for name in names] for f in found])
+    everything = np.array([[f["chosen on all"][name] for name in names] for f in found])
+    start = np.array([found[0]["at the start"][name] for name in names])
+    rows = {name: _both(held[:, k].mean(axis=0)) for k, name in enumerate(names)}
+    rows["mean, left out"] = _both(held.mean(axis=(0, 1)))
+    rows["mean, chosen on all"] = _both(everything.mean(axis=(0, 1)))
+    rows["mean, at the start"] = _both(start.mean(axis=0))
+    rows |= {f"seed {s}, left out": _both(h.mean(axis=0)) for s, h in zip(SEEDS, held, strict=True)}
+    rows |= {f"seed {s}, chosen on all": _both(e.mean(axis=0)) for s, e in zip(SEEDS, everything, strict=True)}
+    table("Left-out error, total, degrees, mean over the seeds", "left out", ["real time", "smoothed"], rows)
+    return {f"seed {s}": f for s, f in zip(SEEDS, found, strict=True)}
+
+
+def _both(values: np.ndarray) -> list[str]:
+    return [f"{v:.3f}" for v in values]
+
+
+def _cross_of_seed(trials: list[Trial], delay: list[float], seed: int) -> dict[str, dict[str, object]]:
+    """Errors of each trial left out, and of all by the choice on all, with the points drawn from one seed."""
     guard = np.array([t.group == "RepoIMU" for t in trials])
 
     def errors(point: _search.Point) -> np.ndarray:
@@ -361,7 +383,7 @@ def cross(trials: list[Trial], known_delay: bool = False) -> dict[str, object]:
             return False
         return True
 
-    search = _search.Search(START, costs, allowed)
+    search = _search.Search(START, costs, allowed, seed)
 
     def choose(out: int) -> _search.Point:
         weight = np.where(guard, GUARD / max(guard.sum(), 1), 1.0)
@@ -369,31 +391,14 @@ def cross(trials: list[Trial], known_delay: bool = False) -> dict[str, object]:
         weight[[out] if out >= 0 else []] = 0.0
         return search.choose(weight)
 
-    rows, held = {}, []
+    choices = {trials[k].name: choose(int(k)) for k in np.flatnonzero(~guard)}
     everything = choose(-1)
-    console.print("chosen on all trials: " + _named(everything))
-    for k in np.flatnonzero(~guard):
-        point = choose(int(k))
-        held.append(errors(point)[k])
-        changed = {n: v for n, v in point.items() if abs(np.log(v / everything[n])) > np.log(1.25)}
-        rows[trials[k].name] = [f"{held[-1][0]:.2f}", f"{held[-1][1]:.2f}", _named(changed)]
-        console.print(trials[k].name, *rows[trials[k].name])
-    for name, values in (
-        ("left out", np.array(held)),
-        ("chosen on all", errors(everything)[~guard]),
-        ("at the start", errors(START)[~guard]),
-    ):
-        rows[f"mean, {name}"] = [f"{v:.3f}" for v in values.mean(axis=0)] + [""]
-    table(
-        "Left-out error, total, degrees",
-        "left out",
-        ["real time", "smoothed", "chosen otherwise (by a quarter)"],
-        rows,
-    )
+    held = {t.name: list(errors(choices[t.name])[k]) for k, t in enumerate(trials) if t.name in choices}
     return {
-        "left out": {trials[k].name: list(e) for k, e in zip(np.flatnonzero(~guard), held, strict=True)},
+        "left out": held,
         "chosen on all": {t.name: list(e) for t, e in zip(trials, errors(everything), strict=True)},
-        "parameters": everything,
+        "at the start": {t.name: list(e) for t, e in zip(trials, errors(START), strict=True)},
+        "choices": choices | {"all": everything},
     }
 
 
