@@ -36,6 +36,8 @@ def summarise(
     rows += _certainty(orientation)
     if "mag_iron" in orientation.diagnostics and (iron := orientation.diagnostics["mag_iron"][-1]) > 0.0:
         rows.append(("Magnetometer", f"hard iron of {iron:.1f} µT taken out"))
+    if "acc_bias" in orientation.diagnostics and (bias := orientation.diagnostics["acc_bias"][-1]) > 0.0:
+        rows.append(("Accelerometer", f"bias of {bias:.2f} m/s² taken out"))
     if recording.reference is not None:
         rows += _error(recording, orientation)
     flagged = ", ".join(f"{name}: {count}" for name, count in flag_counts(orientation).items())

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from northdown.estimators._calibrating_acc_bias import correct_acc_bias
 from northdown.estimators._calibrating_acceleration import (
     LOST_WITHIN,
     coasted,
@@ -119,6 +120,7 @@ def close_epoch(p: Any, s: Any) -> None:
         r = p.rest_speed if still else p.speed * (1.0 + p.speed_motion * s[MOTION])
         r /= s[TIME_ACC]
         watch_acceleration(p, s, time, r, still)
+        correct_acc_bias(p, s, time)
         for a in range(3):
             take_velocity(s, a, r, -s[SPEED + a])
     if s[COUNT_MAG] > 0.0:

@@ -9,6 +9,7 @@
 
     # rate = g - gyr_bias - gyr_matrix · g, for the gyroscope's output g
     # field = m - mag_iron, for the magnetometer's output m of mag_delay later
+    # specific force = a - acc_bias, for the accelerometer's output a
     [gyr_bias]
     unit = "rad/s"
     value = [0.001, -0.002, 0.0005]
@@ -45,6 +46,7 @@ _UNITS: Final = {
     "rest_offset": "rad/s",
     "mag_delay": "s",
     "mag_iron": "µT",
+    "acc_bias": "m/s²",
 }
 _HEAD: Final[Table] = {"format": FORMAT, "version": VERSION, "estimator": "calibrating-ekf", "frame": "body"}
 
@@ -64,6 +66,7 @@ def save(known: LearntCalibration, path: str | os.PathLike[str]) -> None:
         lines = [f"{key} = {toml_value(value)}" for key, value in _HEAD.items()]
         lines += ["", "# rate = g - gyr_bias - gyr_matrix · g, for the gyroscope's output g"]
         lines += ["# field = m - mag_iron, for the magnetometer's output m of mag_delay later"]
+        lines += ["# specific force = a - acc_bias, for the accelerometer's output a"]
         for name, table in tables.items():
             lines += [f"[{name}]", *(f"{key} = {toml_value(value)}" for key, value in table.items()), ""]
         text = "\n".join(lines)

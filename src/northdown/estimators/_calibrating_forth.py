@@ -11,8 +11,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from northdown.estimators._calibrating_hard_iron import iron_size
 from northdown.estimators._calibrating_layout import (
+    ACC_BIAS,
     CLOSED,
     COUNT_MAG,
     COV,
@@ -25,6 +25,7 @@ from northdown.estimators._calibrating_layout import (
     GYR_BIAS,
     HOLD,
     MAG_DELAY,
+    MAG_IRON,
     MOTION,
     N_MOVE,
     N_TAKEN,
@@ -36,7 +37,7 @@ from northdown.estimators._calibrating_layout import (
     N,
 )
 from northdown.kernels.jit import compiled, inline
-from northdown.kernels.quaternion import conjugate, multiply, rotate
+from northdown.kernels.quaternion import conjugate, length, multiply, rotate
 from northdown.kernels.rows import WIDTH
 from northdown.kernels.runner import (
     MAX_GAP,
@@ -58,7 +59,7 @@ Array = npt.NDArray[np.float64]
 RATE_N: Final = 7
 """Where the rate in navigation axes stands in the output on the way forth; on the way back the covariance does."""
 DIAGNOSTICS: Final = 19
-"""Where departure of the field, delay, stillness, acceleration and iron stand in the output."""
+"""Where departure of the field, delay, stillness, acceleration, iron and accelerometer bias stand in the output."""
 
 # What is kept of an epoch.
 END: Final = 0  # index of its last sample
@@ -153,7 +154,8 @@ def _make_forth(kernel: Kernel) -> Callable[..., Any]:
             out[i, DIAGNOSTICS + 1] = s[MAG_DELAY]
             out[i, DIAGNOSTICS + 2] = s[STILL]
             out[i, DIAGNOSTICS + 3] = math.sqrt(s[MOTION])
-            out[i, DIAGNOSTICS + 4] = iron_size(s)
+            out[i, DIAGNOSTICS + 4] = length((s[MAG_IRON], s[MAG_IRON + 1], s[MAG_IRON + 2]))
+            out[i, DIAGNOSTICS + 5] = length((s[ACC_BIAS], s[ACC_BIAS + 1], s[ACC_BIAS + 2]))
             rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
             for j in range(3):
                 out[i, RATE_N + j] = rate_n[j]

@@ -210,13 +210,6 @@ def iron_variances(s: Any) -> Any:
     return k * inverse[0], k * inverse[3], k * inverse[5]
 
 
-@inline
-def iron_size(s: Any) -> float:
-    """Norm of the iron that is taken out, in the magnetometer's unit."""
-    x, y, z = s[MAG_IRON], s[MAG_IRON + 1], s[MAG_IRON + 2]
-    return math.sqrt(x * x + y * y + z * z)
-
-
 def iron_sigma(s: FloatArray) -> FloatArray:
     """Standard deviations (3,) of the iron in a state; of none taken out, by what the field shows of it as well."""
     import numpy as np

@@ -26,6 +26,7 @@ from typing import Any, Final
 from northdown.estimators._calibrating_layout import IRON, IRON_HEADING, IRON_KNOWN, IRON_TURN, Terms
 from northdown.kernels.jit import inline
 from northdown.kernels.quaternion import dot, rotate_inverse
+from northdown.kernels.symmetric import inverse3, product3
 from northdown.kernels.turn import columns
 
 # The sums: weight, Σ R by columns, Σ m, Σ Rᵀ m.
@@ -94,14 +95,14 @@ def fit(s: Any, at: int, expected: float, centre: Any) -> Any:
     c = (s[r + 6] * k, s[r + 7] * k, s[r + 8] * k)
     across = ((x * a[1] - y * a[0]) / level, (x * b[1] - y * b[0]) / level, (x * c[1] - y * c[0]) / level)
     e = expected * k
-    inverse = _inverse(
+    inverse = inverse3(
         1.0 + e - dot(a, a), -dot(a, b), -dot(a, c), 1.0 + e - dot(b, b), -dot(b, c), 1.0 + e - dot(c, c)
     )
     r = at + _BODY_FIELD
     pull = (s[r] * k - dot(a, m), s[r + 1] * k - dot(b, m), s[r + 2] * k - dot(c, m))
     with_centre = (pull[0] + e * centre[0], pull[1] + e * centre[1], pull[2] + e * centre[2])
-    h = _product(inverse, with_centre)
-    return True, h, pull, m, inverse, dot(across, h) / level, e * dot(across, _product(inverse, across))
+    h = product3(inverse, with_centre)
+    return True, h, pull, m, inverse, dot(across, h) / level, e * dot(across, product3(inverse, across))
 
 
 @inline
@@ -112,22 +113,3 @@ def look_for_iron(s: Any, field: Any, weight: float) -> None:
     if known:
         s[IRON_TURN] = turn
         s[IRON_KNOWN] = 1.0 - still_open
-
-
-@inline
-def _inverse(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> Any:
-    """Upper triangle of the inverse of a symmetric positive definite 3 × 3 matrix, by its adjugate."""
-    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
-    k = 1.0 / (xx * a + xy * b + xz * c)
-    return k * a, k * b, k * c, k * d, k * e, k * f
-
-
-@inline
-def _product(m: Any, v: Any) -> Any:
-    """Of a symmetric matrix, given by its upper triangle, and a vector."""
-    return (
-        m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
-        m[1] * v[0] + m[3] * v[1] + m[4] * v[2],
-        m[2] * v[0] + m[4] * v[1] + m[5] * v[2],
-    )

@@ -111,8 +111,19 @@ IRON_TURNED: Final = IRON_WRONG + 1  # variance of the heading that was wrong by
 FIELD_SUMS: Final = IRON_TURNED + 1  # sums as those above, of the field with the iron in it
 FIELD_SQUARE: Final = FIELD_SUMS + 16
 
+# A bias of the accelerometer that is so large that it is taken out.
+ACC_BIAS: Final = FIELD_SQUARE + 1  # the bias, body axes
+ACC_STATE: Final = ACC_BIAS + 3  # 0 none found, 1 found, -1 as given
+ACC_CENTRE: Final = ACC_STATE + 1  # the bias expected
+ACC_VARIANCE: Final = ACC_CENTRE + 3  # its variance; infinite where only its usual size is known
+ACC_TILT: Final = ACC_VARIANCE + 1  # variance of tilt from what the bias found may be wrong by
+LOW_UP: Final = ACC_TILT + 1  # upwards, body axes, low-passed as the specific force
+NORM_LEFT: Final = LOW_UP + 3  # variance of the norm that the bias does not explain
+NORM_SUMS: Final = NORM_LEFT + 1  # weight, Σ n, Σ n², Σ u, Σ n u, Σ u uᵀ (upper triangle)
+UNTRIED: Final = NORM_SUMS + 15  # time since a bias was last looked for
+
 # Seven scalar measurements of an epoch: velocity, heading, rest. Of each 1/S (0: not taken) and y/S.
-TAKEN: Final = FIELD_SQUARE + 1
+TAKEN: Final = UNTRIED + 1
 HEADING_SLOPE: Final = TAKEN + 14  # derivatives of the heading with respect to tilt x, tilt y and delay
 RAW: Final = HEADING_SLOPE + 3  # of each the variance of its noise, and what it misses the nominal values by
 WIDENED: Final = RAW + 14  # whether the bias was given the variance of its miss before they were taken
@@ -136,6 +147,7 @@ class Terms(NamedTuple):
     speed_motion: float
     motion_window: float
     acc_gate: float
+    acc_share: float
     mag: float
     norm_gate: float
     dip_gate: float

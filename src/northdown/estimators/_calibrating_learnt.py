@@ -10,8 +10,10 @@ import numpy as np
 from northdown._validation import FloatArray, as_float_array, check_no_infinity, check_number
 from northdown.errors import InputError, expected
 from northdown.estimators import _calibrating_files as files
+from northdown.estimators._calibrating_acc_bias import acc_bias_sigma, begin_with_acc_bias
 from northdown.estimators._calibrating_hard_iron import begin_with_iron, iron_sigma
 from northdown.estimators._calibrating_layout import (
+    ACC_BIAS,
     BIAS,
     COV,
     DELAY,
@@ -28,12 +30,12 @@ from northdown.estimators._calibrating_result import DIAGONAL
 from northdown.estimators._stream import Stream
 from northdown.kernels.runner import N_RUNNER
 
-_SHAPES = {"gyr_bias": (3,), "gyr_matrix": (3, 3), "rest_offset": (3,), "mag_iron": (3,)}
+_SHAPES = {"gyr_bias": (3,), "gyr_matrix": (3, 3), "rest_offset": (3,), "mag_iron": (3,), "acc_bias": (3,)}
 
 
 @dataclass(frozen=True, eq=False)
 class LearntCalibration:
-    """Calibration of the gyroscope, delay and hard iron of the magnetometer, with standard deviations.
+    """Calibration of gyroscope, magnetometer (delay, hard iron) and accelerometer (bias), with standard deviations.
 
     Parameters
     ----------
@@ -48,6 +50,8 @@ class LearntCalibration:
     mag_iron, mag_iron_sigma : (3,) arrays
         Hard iron that is taken out of the magnetometer's samples, in their unit (µT). None is taken out of what a run
         begins with if it is zero; with a sigma of zero it stays as it is.
+    acc_bias, acc_bias_sigma : (3,) arrays
+        Bias that is taken out of the accelerometer's samples, m/s². The same holds for it.
 
     Raises
     ------
@@ -65,6 +69,8 @@ class LearntCalibration:
     mag_delay_sigma: float
     mag_iron: FloatArray
     mag_iron_sigma: FloatArray
+    acc_bias: FloatArray
+    acc_bias_sigma: FloatArray
 
     def __post_init__(self) -> None:
         for name, shape in _SHAPES.items():
@@ -125,6 +131,8 @@ def learnt(stream: Stream) -> LearntCalibration:
         mag_delay_sigma=float(sigma[DELAY]),
         mag_iron=s[MAG_IRON : MAG_IRON + 3],
         mag_iron_sigma=iron_sigma(s),
+        acc_bias=s[ACC_BIAS : ACC_BIAS + 3],
+        acc_bias_sigma=acc_bias_sigma(s),
     )
 
 
@@ -136,6 +144,7 @@ def begin_with(stream: Stream, known: LearntCalibration) -> None:
     s[REST_OFFSET : REST_OFFSET + 3] = known.rest_offset
     s[MAG_DELAY] = known.mag_delay
     begin_with_iron(s, known.mag_iron, known.mag_iron_sigma)
+    begin_with_acc_bias(s, known.acc_bias, known.acc_bias_sigma)
     variance = {
         BIAS: known.gyr_bias_sigma,
         MATRIX: known.gyr_matrix_sigma.T.ravel(),

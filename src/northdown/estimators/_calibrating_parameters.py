@@ -39,6 +39,9 @@ class CalibrationParameters(Estimator):
     acc_gate : float
         By how much specific force, averaged, must be more than usual for acceleration that lasts to be seen, m/s².
         Raising it lets stronger accelerations tilt the attitude, and is misled less by a badly calibrated sensor.
+    acc_share : float
+        Part of the variation of specific force's norm that a bias of the accelerometer must explain to be taken out;
+        1 for never. Raising it needs surer evidence, and leaves a larger bias in.
     mag_noise : float
         Noise density of the heading from the magnetometer, rad/√Hz. Raising it makes heading follow more slowly.
     norm_gate : float
@@ -127,6 +130,7 @@ class CalibrationParameters(Estimator):
     speed_motion: float = parameter(0.1, unit="s⁴/m²", low=0.0)
     motion_window: float = parameter(1.0, unit="s", above=0.0)
     acc_gate: float = parameter(0.15, unit="m/s²", above=0.0)
+    acc_share: float = parameter(0.4, low=0.0, high=1.0)
     mag_noise: float = parameter(0.02, unit="rad/√Hz", above=0.0)
     norm_gate: float = parameter(0.05, above=0.0)
     dip_gate: float = parameter(0.05, unit="rad", above=0.0)
@@ -170,6 +174,7 @@ class CalibrationParameters(Estimator):
             speed_motion=self.speed_motion,
             motion_window=self.motion_window,
             acc_gate=self.acc_gate,
+            acc_share=self.acc_share,
             mag=self.mag_noise**2,
             norm_gate=self.norm_gate,
             dip_gate=self.dip_gate,

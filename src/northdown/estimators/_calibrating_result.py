@@ -6,9 +6,11 @@ import math
 from typing import Any, Final
 
 from northdown.estimators._calibrating_epoch import clear_sums
-from northdown.estimators._calibrating_hard_iron import iron_size, keep_iron
+from northdown.estimators._calibrating_hard_iron import keep_iron
 from northdown.estimators._calibrating_iron import forget_iron, heading_doubt
 from northdown.estimators._calibrating_layout import (
+    ACC_BIAS,
+    ACC_TILT,
     ATTITUDE,
     BIAS,
     CLIPPING,
@@ -26,7 +28,7 @@ from northdown.estimators._calibrating_layout import (
 )
 from northdown.kernels.jit import inline
 from northdown.kernels.kalman import symmetric3
-from northdown.kernels.quaternion import multiply, rotate
+from northdown.kernels.quaternion import length, multiply, rotate
 from northdown.kernels.rows import WIDTH
 from northdown.kernels.so3 import exp
 from northdown.kernels.weighting import REJECTED
@@ -41,20 +43,27 @@ START_SPEED: Final = 0.1  # m/s, standard deviation of the velocity that the fir
 
 
 @inline
-def covariance_of(t: Terms, p: Any, rate_n: Any, doubt: float) -> Any:
+def doubts(t: Terms, s: Any) -> Any:
+    """Variances of tilt and heading beside those of the filter, rad²: accelerometer's bias, iron."""
+    return t.tilt_floor + s[ACC_TILT], heading_doubt(t, s)
+
+
+@inline
+def covariance_of(t: Terms, p: Any, rate_n: Any, doubt: Any) -> Any:
     """Covariance that is reported, nine entries by rows, for that of the filter (upper triangle) and the rate.
 
-    `doubt` is the variance of `heading_doubt`.
+    `doubt` are the variances of `doubts`.
     """
     x, y, z = rate_n
+    tilt, heading = doubt
     k, f = t.inflation, t.time_floor
     return symmetric3(
-        k * p[0] + t.tilt_floor + f * x * x,
+        k * p[0] + tilt + f * x * x,
         k * p[1] + f * x * y,
         k * p[2] + f * x * z,
-        k * p[3] + t.tilt_floor + f * y * y,
+        k * p[3] + tilt + f * y * y,
         k * p[4] + f * y * z,
-        k * p[5] + doubt + f * z * z,
+        k * p[5] + heading + f * z * z,
     )
 
 
@@ -92,17 +101,20 @@ def ahead(t: Terms, q: Any, rate_n: Any) -> Any:
 
 @inline
 def output(p: Any, s: Any) -> Any:
-    """Attitude, bias, covariance of the attitude, sigma of the bias, u, delay, stillness, acceleration, iron."""
+    """Attitude, bias, covariance of the attitude, sigma of the bias, and the diagnostics."""
     t = Terms(*p)
     row = COV + WIDTH
     p_upper = (s[COV], s[COV + 1], s[COV + 2], s[row + 1], s[row + 2], s[row + WIDTH + 2])
     rate_n = rotate((s[0], s[1], s[2], s[3]), (s[RATE], s[RATE + 1], s[RATE + 2]))
-    covariance = covariance_of(t, p_upper, rate_n, heading_doubt(t, s))
+    covariance = covariance_of(t, p_upper, rate_n, doubts(t, s))
     at = COV + BIAS * DIAGONAL
     sigma = (math.sqrt(s[at]), math.sqrt(s[at + DIAGONAL]), math.sqrt(s[at + 2 * DIAGONAL]))
     q = ahead(t, (s[0], s[1], s[2], s[3]), rate_n)
     nominal = q + (s[4], s[5], s[6])
-    return nominal + covariance + sigma + (s[DEPARTURE], s[MAG_DELAY], s[STILL], math.sqrt(s[MOTION]), iron_size(s))
+    iron = length((s[MAG_IRON], s[MAG_IRON + 1], s[MAG_IRON + 2]))
+    bias = length((s[ACC_BIAS], s[ACC_BIAS + 1], s[ACC_BIAS + 2]))
+    seen = (s[DEPARTURE], s[MAG_DELAY], s[STILL], math.sqrt(s[MOTION]), iron, bias)
+    return nominal + covariance + sigma + seen
 
 
 @inline

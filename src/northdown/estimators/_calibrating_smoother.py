@@ -11,6 +11,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from northdown.estimators import _calibrating_acc_bias as acc_bias
+from northdown.estimators import _calibrating_hard_iron as hard_iron
 from northdown.estimators._calibrating_again import again
 from northdown.estimators._calibrating_back import back, residuals
 from northdown.estimators._calibrating_forth import (
@@ -26,10 +28,17 @@ from northdown.estimators._calibrating_forth import (
     RATE_N,
     forth,
 )
-from northdown.estimators._calibrating_hard_iron import FOUND, GIVEN_IRON
-from northdown.estimators._calibrating_iron import heading_doubt
-from northdown.estimators._calibrating_layout import COV, FIELD_SQUARE, IRON_STATE, MAG_IRON, Terms
-from northdown.estimators._calibrating_result import ahead, covariance_of
+from northdown.estimators._calibrating_layout import (
+    ACC_BIAS,
+    ACC_STATE,
+    COV,
+    FIELD_SQUARE,
+    IRON_STATE,
+    MAG_IRON,
+    UNTRIED,
+    Terms,
+)
+from northdown.estimators._calibrating_result import ahead, covariance_of, doubts
 from northdown.estimators._calibrating_weights import leave_travel, reweigh
 from northdown.estimators._stream import Stream, all_samples
 from northdown.kernels.jit import compiled, inline
@@ -42,6 +51,7 @@ from northdown.kernels.tuples import to_fixed_tuple
 from northdown.recording import Recording
 
 KEPT_IRON: Final = slice(N_RUNNER + MAG_IRON, N_RUNNER + FIELD_SQUARE + 1)
+KEPT_BIAS: Final = slice(N_RUNNER + ACC_BIAS, N_RUNNER + UNTRIED)
 _FOUND_LATE: Final = 0.3
 """Standard deviation (rad) of the tilt that a late first sample of the accelerometer gives to the beginning."""
 
@@ -49,6 +59,7 @@ Array = npt.NDArray[np.float64]
 N_TERMS: Final = len(Terms._fields)
 _VECTOR: Any = numba.float64[::1]
 _ARRAY: Any = numba.float64[:, ::1]
+_PAIR: Any = numba.types.UniTuple(numba.float64, 2)  # type: ignore[no-untyped-call]
 _TIMES: Any = numba.types.Array(numba.float64, 1, "C", readonly=True)  # a recording's may be read-only
 
 
@@ -90,12 +101,18 @@ def smooth(
         return int(kept)
 
     kept = go()
-    if work.state[N_RUNNER + IRON_STATE] == FOUND:
+    if work.state[N_RUNNER + ACC_STATE] == acc_bias.FOUND:
+        # Once more without the bias of the accelerometer that was found by the end.
+        state[KEPT_BIAS] = work.state[KEPT_BIAS]
+        state[N_RUNNER + ACC_STATE] = acc_bias.GIVEN_BIAS
+        work.state[:] = state
+        kept = go()
+    if work.state[N_RUNNER + IRON_STATE] == hard_iron.FOUND:
         # Once more without the iron that was found by the end, unless it has not been there from the beginning.
         departure = _mean_departure(out)
         live = state.copy()
         state[KEPT_IRON] = work.state[KEPT_IRON]
-        state[N_RUNNER + IRON_STATE] = GIVEN_IRON
+        state[N_RUNNER + IRON_STATE] = hard_iron.GIVEN_IRON
         work.state[:] = state
         kept = go()
         if _mean_departure(out) > departure:
@@ -114,7 +131,7 @@ def smooth(
     if not start[LATE]:
         _second_pass(work.params, start[BEGIN:], records, most, walk)
     back()(records, smoothed)
-    doubt = heading_doubt(Terms(*work.params[:N_TERMS]), work.state[N_RUNNER:])
+    doubt = doubts(Terms(*work.params[:N_TERMS]), work.state[N_RUNNER:])
     spread()(work.params, work.turn, doubt, time, records, smoothed, out)
     return flags, out
 
@@ -139,7 +156,7 @@ def _second_pass(params: Array, begin: Array, records: Array, most: float, walk:
 
 
 def _spread(
-    params: Array, turn: Array, doubt: float, time: Array, records: Array, smoothed: Array, out: Array
+    params: Array, turn: Array, doubt: tuple[float, float], time: Array, records: Array, smoothed: Array, out: Array
 ) -> None:
     """Correct every sample: between two epochs the correction goes evenly from the one's to the other's."""
     n = len(time)
@@ -180,7 +197,7 @@ def _spread(
 
 @inline
 def _write_sample(
-    p: Any, f: Any, axes: Any, doubt: float, a: Array, b: Array, u: float, at_end: bool, end: Any, to: Array
+    p: Any, f: Any, axes: Any, doubt: Any, a: Array, b: Array, u: float, at_end: bool, end: Any, to: Array
 ) -> None:
     d = (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * (b[2] - a[2]))
     q = end if at_end else multiply(exp(d), (to[0], to[1], to[2], to[3]))
@@ -207,5 +224,5 @@ def _write_sample(
 @cache
 def spread() -> Callable[..., None]:
     """Compiled ``spread(params, turn, doubt, time, records, smoothed, out)``."""
-    signature = (_VECTOR, _VECTOR, numba.float64, _TIMES, _ARRAY, _ARRAY, _ARRAY)
+    signature = (_VECTOR, _VECTOR, _PAIR, _TIMES, _ARRAY, _ARRAY, _ARRAY)
     return compiled(_spread, "calibrating-spread", signature)

@@ -10,6 +10,7 @@ from typing import Any, Final
 from northdown.estimators._calibrating_clip import add_lacking, unclipped
 from northdown.estimators._calibrating_epoch import clear_sums, close_epoch
 from northdown.estimators._calibrating_layout import (
+    ACC_BIAS,
     ACC_SQUARE,
     AGE_ACC,
     AGE_MAG,
@@ -85,7 +86,7 @@ def step(p: Any, s: Any, dt: float, gyr: Any, acc: Any, mag: Any) -> Any:
     s[AGE_ACC] += dt
     s[AGE_MAG] += dt
     if is_sample(acc):
-        force = rotate(q, acc)
+        force = rotate(q, (acc[0] - s[ACC_BIAS], acc[1] - s[ACC_BIAS + 1], acc[2] - s[ACC_BIAS + 2]))
         age = min(s[AGE_ACC], LONGEST_FORCE)
         up = force[2] + p.gravity
         square = force[0] * force[0] + force[1] * force[1] + up * up

@@ -133,6 +133,7 @@ from northdown.checks.sensors import gyr_levels
 from northdown.errors import InputError, expected
 from northdown.estimators._calibrating_clip import alert, restored
 from northdown.estimators._calibrating_layout import (
+    ACC_VARIANCE,
     ALERT,
     ATTITUDE,
     BIAS,
@@ -186,7 +187,7 @@ class CalibratingEKF(CalibrationParameters):
         step,
         n_params=len(Terms._fields),
         n_state=N_STATE,
-        n_out=24,
+        n_out=25,
         output=output,
         aligned=aligned,
         flagged=flagged,
@@ -202,6 +203,7 @@ class CalibratingEKF(CalibrationParameters):
         "still": slice(21, 22),
         "acceleration": slice(22, 23),
         "mag_iron": slice(23, 24),
+        "acc_bias": slice(24, 25),
     }
 
     def _parameters(self, frame: Frame) -> Sequence[float]:
@@ -222,7 +224,7 @@ class CalibratingEKF(CalibrationParameters):
         s[COV + np.arange(N) * DIAGONAL] = sigma2
         s[LEVELS : LEVELS + 6] = self._levels if self.gyr_range == 0.0 else self.gyr_range
         s[QUANTUM] = math.nan
-        s[IRON_VARIANCE] = math.inf
+        s[IRON_VARIANCE] = s[ACC_VARIANCE] = math.inf
         s[ALERT] = alert(s)
         return tuple(s[4:])
 

@@ -18,6 +18,12 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @inline
+def length(a: Vector) -> float:
+    """Norm of a vector."""
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@inline
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product a × b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
