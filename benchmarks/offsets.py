@@ -1,10 +1,12 @@
 """Constant errors that nobody has calibrated: BROAD's trials with hard iron, or with a bias of the accelerometer.
 
-    python benchmarks/offsets.py [--root DIR] [--sensor mag,acc] [--draws 3] [--json FILE]
+    python benchmarks/offsets.py [--root DIR] [--part mag,acc,delivered] [--draws 3] [--json FILE]
 
 To the magnetometer (the field has 45 to 49 µT) or the accelerometer of each trial a constant in a random direction
 is added. Of the magnetometer it is heading that counts, of the accelerometer inclination, over samples in motion from
-75 s on: by then the body has turned enough for the constant to show, or never does. See README.md in this folder.
+75 s on: by then the body has turned enough for the constant to show, or never does. `delivered` simulates a hand that
+moves an accelerometer as delivered: bias 0.4 m/s², scale and misalignment 1 or 2 % (1σ, each axis). See README.md in
+this folder.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 
 import flagship
 import northdown as nd
+from northdown.simulation import measure, random_motion
 
 FROM = 75.0
 """Time (s) after the beginning from which the error counts."""
@@ -85,23 +88,65 @@ def table_of(sensor: str, recordings: list[nd.Recording], draws: int) -> dict[st
     return found
 
 
+def hand(seed: int, turn: float, percent: float) -> nd.Recording:
+    """Two minutes of motion of a hand, turning by `turn` rad (1σ), of an accelerometer as delivered."""
+    exact = measure(random_motion(120.0, seed, turn=turn, reach=0.05 + 0.07 * turn), rate=100.0, seed=seed)
+    noise, errors = np.random.default_rng(seed), np.random.default_rng(100 + seed)
+    matrix = np.eye(3) + 0.01 * percent * errors.normal(size=(3, 3))
+    bias = 0.4 * errors.normal(size=3)
+    return dataclasses.replace(
+        exact,
+        gyr=exact.gyr + 2e-3 * noise.normal(size=exact.gyr.shape),
+        acc=exact.acc @ matrix.T + bias + 0.03 * noise.normal(size=exact.acc.shape),
+        mag=exact.mag + 0.3 * noise.normal(size=exact.mag.shape),
+    )
+
+
+def delivered(sensors: int = 6) -> dict[str, dict[str, list[float]]]:
+    """Print the table of sensors as delivered; total errors."""
+    methods = flagship.methods()
+    left = flagship.ours(acc_share=1.0)
+    methods |= {"bias left in": left.run, "left in, smoothed": left.smooth}
+    rows: dict[str, list[str]] = {}
+    found: dict[str, dict[str, list[float]]] = {}
+    for percent in (1.0, 2.0):
+        for turn in (0.3, 1.0, 3.0):
+            recordings = [hand(seed, turn, percent) for seed in range(sensors)]
+            key = f"{percent:g} %, turns by {turn:g} rad"
+            found[key] = {
+                name: [nd.attitude_error(method(r), r).rmse().total_deg for r in recordings]
+                for name, method in methods.items()
+            }
+            rows[key] = [f"{np.mean(v):.2f}" for v in found[key].values()]
+    rows["mean"] = [f"{np.mean([v[name] for v in found.values()]):.2f}" for name in methods]
+    title = f"Accelerometers as delivered: total error, degrees, mean over {sensors} sensors"
+    flagship.table(title, "scale and misalignment", list(methods), rows)
+    return found
+
+
 def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, default=os.environ.get("NORTHDOWN_DATA"), help="default: NORTHDOWN_DATA")
-    parser.add_argument("--sensor", default="mag,acc", help="mag, acc or both, comma-separated")
+    parser.add_argument("--part", default="mag,acc,delivered", metavar="NAMES", help="comma-separated")
     parser.add_argument("--draws", type=int, default=3, help="directions of the constant for each trial and size")
     parser.add_argument("--json", metavar="FILE", type=Path, help="also write the figures there")
     options = parser.parse_args()
-    if options.root is None:
-        flagship.console.print("offsets: skipped, as there are no recordings; set NORTHDOWN_DATA or give --root")
-        return 0
-    sensors = options.sensor.split(",")
-    if unknown := [s for s in sensors if s not in SENSORS]:
-        flagship.console.print(f"offsets: expected mag, acc or both, got {', '.join(unknown)}")
+    parts = options.part.split(",")
+    if unknown := [name for name in parts if name not in (*SENSORS, "delivered")]:
+        flagship.console.print(f"offsets: expected parts out of mag, acc, delivered, got {', '.join(unknown)}")
         return 1
-    recordings = [nd.datasets.broad(name, options.root) for name in nd.datasets.names("broad", options.root)]
-    found = {sensor: table_of(sensor, recordings, options.draws) for sensor in sensors}
+    found: dict[str, object] = {}
+    if "delivered" in parts:
+        found["delivered"] = delivered()
+    sensors = [name for name in parts if name in SENSORS]
+    if sensors and options.root is None:
+        flagship.console.print(
+            "offsets: mag and acc skipped, as there are no recordings; set NORTHDOWN_DATA or --root"
+        )
+    elif sensors:
+        recordings = [nd.datasets.broad(name, options.root) for name in nd.datasets.names("broad", options.root)]
+        found |= {sensor: table_of(sensor, recordings, options.draws) for sensor in sensors}
     if options.json:
         options.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
     return 0

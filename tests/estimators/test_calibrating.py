@@ -314,6 +314,8 @@ def test_a_wrong_bias_does_not_spin_a_body_at_rest():
         mag_delay_sigma=0.01,
         mag_iron=zero,
         mag_iron_sigma=zero + 2.0,
+        acc_bias=zero,
+        acc_bias_sigma=zero + 0.1,
     )
     n, rng = 6000, np.random.default_rng(4)
     recording = nd.Recording(

@@ -23,7 +23,7 @@ VECTOR_SIGMAS, MATRIX_SIGMAS = (arrays(np.float64, shape, elements=SIGMAS) for s
 CALIBRATIONS = st.builds(
     LearntCalibration,
     *(VECTORS, VECTOR_SIGMAS, MATRICES, MATRIX_SIGMAS, VECTORS, VECTOR_SIGMAS),
-    *(st.floats(-0.05, 0.05), SIGMAS, VECTORS, VECTOR_SIGMAS),
+    *(st.floats(-0.05, 0.05), SIGMAS, VECTORS, VECTOR_SIGMAS, VECTORS, VECTOR_SIGMAS),
 )
 
 
@@ -94,7 +94,7 @@ def test_smoothing_learns_the_same():
 @pytest.fixture
 def good():
     zero, matrix = np.zeros(3), np.zeros((3, 3))
-    return LearntCalibration(zero, zero, matrix, matrix, zero, zero, 0.01, 0.001, zero, zero)
+    return LearntCalibration(zero, zero, matrix, matrix, zero, zero, 0.01, 0.001, zero, zero, zero, zero)
 
 
 @pytest.mark.parametrize(

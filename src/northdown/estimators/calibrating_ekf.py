@@ -80,6 +80,11 @@ Hard iron
 Where iron on the body explains more than `iron_share` of the variation of the field, it is taken out of the
 magnetometer's samples; see `_calibrating_hard_iron`. Smaller iron widens the covariance (below).
 
+Bias of the accelerometer
+-------------------------
+Where a bias of the accelerometer explains more than `acc_share` of the variation of specific force's norm, it is
+taken out of the samples; see `_calibrating_acc_bias`.
+
 Clipping
 --------
 Where the gyroscope is at the end of its range (`gyr_range`, or found from the data for each side of each axis), what
@@ -97,7 +102,8 @@ The filter's own P would hold if all errors were white and all of the model. Wha
     \kappa^2 P_{\theta\theta} + \operatorname{diag}(\sigma_t^2, \sigma_t^2,
     \sigma_h^2 (\max(d, 0.04) + (\psi / 0.01)^2)) + \sigma_\tau^2\, (\hat R\omega)(\hat R\omega)^T
 
-κ (`inflation`) for errors that are correlated over time; σ_t (`tilt_sigma`) for the accelerometer's bias; σ_h
+κ (`inflation`) for errors that are correlated over time; σ_t (`tilt_sigma`) for the accelerometer's bias, and what a
+bias that has been found may still be wrong by; σ_h
 (`heading_sigma`) for iron on the body, which turns heading by ψ (rad) on average as far as the field shows it, with a
 part d of its variance still open (see `_calibrating_iron`); σ_τ (`time_sigma`) for the delay of the gyroscope and of
 its clock, which none of the sensors can see. These constants bear on nothing else. For data of which the model is
@@ -174,8 +180,9 @@ class CalibratingEKF(CalibrationParameters):
     -----
     `Orientation.diagnostics` has `field_departure` (u, or its mean, as the last heading was weighed; above 4.6 the
     sample is flagged `MAG_REJECTED`), `mag_delay` (τ, s), `still` (1 at rest), `acceleration`, the root of the
-    mean square of linear acceleration over `motion_window`, m/s², and `mag_iron`, the norm of the hard iron that has
-    been found and is taken out, in the magnetometer's unit. From `smooth` they are those of its first pass.
+    mean square of linear acceleration over `motion_window`, m/s², `mag_iron`, the norm of the hard iron that has been
+    found and is taken out, in the magnetometer's unit, and `acc_bias`, that of the accelerometer's bias, m/s². From
+    `smooth` they are those of its first pass.
     """
 
     _levels: ClassVar[tuple[float, ...]] = (math.inf,) * 6
