@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import re
 import subprocess
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 import northdown as nd
 from northdown.cli.output import ORIENTATION_SUFFIXES
 from northdown.cli.selection import DEFAULT_ESTIMATOR
+from northdown.simulation import measure, random_motion
 
 
 def numbers(text, label):
@@ -157,6 +159,19 @@ def test_standard_input(csv, recording):
         nd.estimators.get(DEFAULT_ESTIMATOR)().run(recording).quat,
     )
     assert result.stderr.decode().startswith("Recording   walk, 601 samples")
+
+
+def test_what_is_taken_out_of_the_samples_is_told(run, csv, tmp_path):
+    assert "taken out" not in run("estimate", csv).out
+    exact = measure(random_motion(80.0, seed=1, turn=0.5, reach=0.05), rate=100.0, seed=1)
+    rng = np.random.default_rng(1)
+    acc = exact.acc + [0.4, -0.3, 0.3] + 0.03 * rng.normal(size=exact.acc.shape)
+    mag = exact.mag + [6.0, -8.0, 5.0] + 0.3 * rng.normal(size=exact.mag.shape)
+    path = tmp_path / "off.csv"
+    nd.write_recording(dataclasses.replace(exact, acc=acc, mag=mag), path)
+    out = run("estimate", path, "--offline").out
+    assert numbers(out, "Magnetometer") == pytest.approx([11.2], abs=0.3)  # µT
+    assert numbers(out, "Accelerometer") == pytest.approx([0.58], abs=0.04)  # m/s²
 
 
 def test_offline_is_smoothing(run, recording, csv, tmp_path):
