@@ -243,7 +243,8 @@ def _begin_without(s: Any, q: Any, b: Any, usual: float) -> None:
         s[LAST_FORCE + a] -= force[a]
         s[COV + (VELOCITY + a) * (WIDTH + 1)] += UNKNOWN_SPEED
         s[COV + (BIAS + a) * (WIDTH + 1)] += tilt / LOST_WITHIN**2
-        s[COV + (ATTITUDE + a) * (WIDTH + 1)] += tilt
+    s[COV + ATTITUDE * (WIDTH + 1)] += tilt
+    s[COV + (ATTITUDE + 1) * (WIDTH + 1)] += tilt
     if s[FIELD] > 0.0:  # a tilt turns heading by as much as the field dips
         s[COV + (ATTITUDE + 2) * (WIDTH + 1)] += tilt * (s[FIELD + 1] / s[FIELD]) ** 2
 
