@@ -6,9 +6,9 @@
 One set of parameters for everything. `cross` chooses the parameters anew for each trial that is left out, from the
 same start and on the other trials only, by the cross-entropy method (see `_search.py`); what is reported is the error
 on the trial that was left out. The cost is the mean logarithm of the errors, real time and smoothed; RepoIMU takes
-part as a guard. It takes an hour and a half for each of its three seeds, which run beside each other. `delay` and `cross-delay` tell the filter the gyroscope's delay as the
-other trials show it by their reference: a calibration of the sensor and no default. `cross-delay` takes as long again
-and is left out of `all`. See README.md in this folder.
+part as a guard. It takes an hour and a half for each of its three seeds, which run beside each other. `delay` and
+`cross-delay` tell the filter the gyroscope's delay as the other trials show it by their reference: a calibration of
+the sensor and no default. `cross-delay` takes as long again and is left out of `all`. See README.md in this folder.
 """
 
 from __future__ import annotations
