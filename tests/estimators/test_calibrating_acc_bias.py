@@ -192,6 +192,14 @@ def test_more_than_a_sensor_can_have_is_forgotten():
     assert s[layout.NORM_SUMS] == 0.0
 
 
+def test_where_the_attitude_was_wrong_nothing_counts():
+    terms = nd.CalibratingEKF()._terms()
+    s = np.zeros(layout.N_STATE)
+    s[0], s[layout.NORM + 1], s[layout.NORM_SUMS], s[layout.MISSED] = 1.0, 100.0, 50.0, 0.1
+    acc_bias.correct_acc_bias(terms, s, 0.04)
+    assert s[layout.NORM_SUMS] == 0.0
+
+
 def test_a_stream_is_the_batch():
     r = recording(4, seconds=90.0)
     filter_ = nd.CalibratingEKF()

@@ -210,7 +210,7 @@ def fit_bias(s: Any) -> Fit:
         s[at + 5] * k - u[2] * u[2],
     )
     e = _noise(s) * k / min(USUAL * USUAL, s[ACC_VARIANCE])
-    inverse = inverse3(c[0] + e, c[1], c[2], c[3] + e, c[4], c[5] + e)
+    inverse = inverse3((c[0] + e, c[1], c[2], c[3] + e, c[4], c[5] + e))
     centre = (s[ACC_CENTRE], s[ACC_CENTRE + 1], s[ACC_CENTRE + 2])
     b = product3(inverse, (d[0] + e * centre[0], d[1] + e * centre[1], d[2] + e * centre[2]))
     quadratic = dot(b, product3(c, b))

@@ -96,7 +96,7 @@ def fit(s: Any, at: int, expected: float, centre: Any) -> Any:
     across = ((x * a[1] - y * a[0]) / level, (x * b[1] - y * b[0]) / level, (x * c[1] - y * c[0]) / level)
     e = expected * k
     inverse = inverse3(
-        1.0 + e - dot(a, a), -dot(a, b), -dot(a, c), 1.0 + e - dot(b, b), -dot(b, c), 1.0 + e - dot(c, c)
+        (1.0 + e - dot(a, a), -dot(a, b), -dot(a, c), 1.0 + e - dot(b, b), -dot(b, c), 1.0 + e - dot(c, c))
     )
     r = at + _BODY_FIELD
     pull = (s[r] * k - dot(a, m), s[r + 1] * k - dot(b, m), s[r + 2] * k - dot(c, m))

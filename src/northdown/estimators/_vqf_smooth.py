@@ -29,6 +29,7 @@ from northdown.kernels.butterworth import SAME_STEP, gains, vector
 from northdown.kernels.jit import compiled, inline
 from northdown.kernels.quaternion import conjugate, dot, multiply, normalize, rotate, unit
 from northdown.kernels.so3 import exp
+from northdown.kernels.symmetric import inverse3, product3
 from northdown.kernels.tuples import to_fixed_tuple
 from northdown.kernels.wahba import arc_to_up
 
@@ -37,25 +38,6 @@ Marks: TypeAlias = npt.NDArray[np.uint8]
 
 N_RECORDED: Final = 15
 """Columns of what the filter records: attitude, bias, its sigma, rest, bound of the sigma, rest of the covariance."""
-
-
-@inline
-def inverse3(c: Any) -> Any:
-    """Inverse of a symmetric 3 × 3 matrix, both by their upper triangles."""
-    xx, xy, xz, yy, yz, zz = c
-    a, b, d = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    k = 1.0 / (xx * a + xy * b + xz * d)
-    return (k * a, k * b, k * d, k * (xx * zz - xz * xz), k * (xy * xz - xx * yz), k * (xx * yy - xy * xy))
-
-
-@inline
-def times3(c: Any, v: Any) -> Any:
-    """Product of a symmetric matrix, by its upper triangle, and a vector."""
-    return (
-        c[0] * v[0] + c[1] * v[1] + c[2] * v[2],
-        c[1] * v[0] + c[3] * v[1] + c[4] * v[2],
-        c[2] * v[0] + c[4] * v[1] + c[5] * v[2],
-    )
 
 
 @inline
@@ -69,8 +51,8 @@ def fuse(ahead: Any, back: Any) -> Any:
     """Bias, its sigma and bound from recorded rows of the same time; in `back` the bias has the other sign."""
     i, j = information(ahead), information(back)
     c = inverse3((i[0] + j[0], i[1] + j[1], i[2] + j[2], i[3] + j[3], i[4] + j[4], i[5] + j[5]))
-    a, b = times3(i, (ahead[4], ahead[5], ahead[6])), times3(j, (back[4], back[5], back[6]))
-    bias = times3(c, (a[0] - b[0], a[1] - b[1], a[2] - b[2]))
+    a, b = product3(i, (ahead[4], ahead[5], ahead[6])), product3(j, (back[4], back[5], back[6]))
+    bias = product3(c, (a[0] - b[0], a[1] - b[1], a[2] - b[2]))
     x, y, z = math.fabs(c[1]), math.fabs(c[2]), math.fabs(c[4])
     bound = math.sqrt(max(c[0] + x + y, c[3] + x + z, c[5] + y + z))
     return bias + (math.sqrt(c[0]), math.sqrt(c[3]), math.sqrt(c[5])), bound

@@ -8,8 +8,9 @@ from northdown.kernels.jit import inline
 
 
 @inline
-def inverse3(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> Any:
-    """Upper triangle of the inverse of a positive definite one, by its adjugate."""
+def inverse3(m: Any) -> Any:
+    """Of a positive definite one, by its adjugate."""
+    xx, xy, xz, yy, yz, zz = m
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
     k = 1.0 / (xx * a + xy * b + xz * c)
